@@ -27,6 +27,20 @@ pub enum Quantity {
     WakeUs,
 }
 
+impl Quantity {
+    /// Every quantity, in the order of the variants; each has its plot.
+    pub const ALL: [Self; 3] = [Self::ResistanceN, Self::DepthMm, Self::WakeUs];
+
+    /// Returns the value of a tick; `direction` is the needle's.
+    fn of(self, r: &TickRecord, direction: [f64; 3]) -> f64 {
+        match self {
+            Self::ResistanceN => -r.force_on_hand_n.iter().zip(direction).map(|(f, d)| f * d).sum::<f64>(),
+            Self::DepthMm => format::mm(r.depth_m),
+            Self::WakeUs => format::us(r.wake_latency_ns),
+        }
+    }
+}
+
 /// Percentiles of one quantity, in microseconds, to three digits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Percentiles {
@@ -48,7 +62,7 @@ pub struct Timing {
 }
 
 pub struct History {
-    curves: Envelope<3>,
+    curves: Envelope<{ Quantity::ALL.len() }>,
     /// Number of each tick, with its wake latency and work, ns, saturated at four seconds.
     timings: VecDeque<(u64, [u32; 2])>,
     counts: [LastMinute; 2],
@@ -92,9 +106,8 @@ impl History {
             }
             let [first, last] = self.ticks.unwrap_or([r.tick; 2]);
             self.ticks = Some([first, last.max(r.tick)]);
-            let along: f64 = r.force_on_hand_n.iter().zip(direction).map(|(f, d)| f * d).sum();
-            let plotted = [-along, format::mm(r.depth_m), format::us(r.wake_latency_ns)];
-            self.curves.add(r.due_ns, plotted.map(|v| v as f32));
+            let plotted = Quantity::ALL.map(|quantity| quantity.of(r, direction) as f32);
+            self.curves.add(r.due_ns, plotted);
             let timing = [r.wake_latency_ns, r.work_ns].map(|ns| u32::try_from(ns).unwrap_or(u32::MAX));
             self.timings.push_back((r.tick, timing));
             for (which, counts) in self.counts.iter_mut().enumerate() {
@@ -239,6 +252,16 @@ mod tests {
                 ..TickRecord::zeroed()
             })
             .collect()
+    }
+
+    #[test]
+    fn curves_stand_in_the_order_of_their_quantities() {
+        assert!(
+            Quantity::ALL
+                .iter()
+                .enumerate()
+                .all(|(n, quantity)| *quantity as usize == n)
+        );
     }
 
     #[test]

@@ -14,8 +14,9 @@ use stylet_base::seen::Seen;
 use stylet_host::moments::{Moment, MomentKind, Moments};
 use stylet_implant::score::Trace;
 
-/// Height of the parts between and under the three plots over time.
-const BESIDE_PLOTS: f32 = 492.0;
+/// Height of the parts under the plots over time, and of the title over each.
+const UNDER_PLOTS: f32 = 432.0;
+const TITLE: f32 = 20.0;
 const PLOT_HEIGHTS: [f32; 2] = [48.0, 150.0];
 /// Height of a line on unseen ticks.
 const SEEN_LINE: f32 = 20.0;
@@ -41,8 +42,9 @@ pub fn plots_ui(
     } else {
         0.0
     };
-    let each =
-        ((height - BESIDE_PLOTS - second - lines as f32 * SEEN_LINE) / 3.0).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
+    let plots = Quantity::ALL.len() as f32;
+    let free = height - UNDER_PLOTS - plots * TITLE - second - lines as f32 * SEEN_LINE;
+    let each = (free / plots).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
     let recent = |ui: &mut egui::Ui, name, color, unit, least, quantity| {
         Strip {
             name,
