@@ -122,6 +122,11 @@ pub use text::Text;
 /// Both programs must agree on this; it is part of every service name.
 pub const SCHEMA_VERSION: u32 = 17;
 
+const _: () = assert!(
+    PARAMETER_COUNT == 53,
+    "the table of parameters has another length: increase SCHEMA_VERSION, then correct this number"
+);
+
 /// Most records in one batch.
 pub const MAX_BATCH: usize = 32;
 /// A partial batch is sent after this time, so that the queue of batches spans a known time.

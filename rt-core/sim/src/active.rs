@@ -146,6 +146,7 @@ fn layers(set: &ParameterSet) -> Layers {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ParameterId as P;
     use stylet_settings::PARAMETERS;
 
     fn device() -> DeviceInfo {
@@ -182,6 +183,24 @@ mod tests {
         let t = TissueParameters::default();
         close(tissue(&set).shear_deg, t.shear_deg);
         close(tissue(&set).recovery_time_s, t.recovery_time_s);
+    }
+
+    /// Guards against a row of the table that no model reads.
+    #[test]
+    fn every_parameter_reaches_its_model() {
+        // Rehearsals and studies read these.
+        let elsewhere = [P::EntryScatter, P::SkinDeflection, P::ScatterSeed];
+        let active = |set: &ParameterSet| activate(set, &device()).map(|active| format!("{active:?}")).ok();
+        let defaults = active(&ParameterSet::default()).expect("defaults are valid");
+        for p in &PARAMETERS {
+            let step = 0.01 * (p.max - p.min);
+            let has_effect = [p.default - step, p.default + step].into_iter().any(|value| {
+                let mut set = ParameterSet::default();
+                set.set(p.id, value);
+                active(&set).is_some_and(|changed| changed != defaults)
+            });
+            assert_eq!(has_effect, !elsewhere.contains(&p.id), "{}", p.key);
+        }
     }
 
     #[test]

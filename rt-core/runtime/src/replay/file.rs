@@ -158,3 +158,22 @@ pub fn default_folder() -> PathBuf {
         .or_else(|| from("HOME").map(|home| home.join(".local/state")));
     state.unwrap_or_else(std::env::temp_dir).join("stylet/flights")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stylet_sim::force::ForceParameters;
+    use stylet_sim::needle::NeedleParameters;
+
+    /// Guards against recordings of the same version and another layout.
+    #[test]
+    fn a_new_setting_of_needle_or_force_has_a_new_version() {
+        let settings = (NeedleParameters::default(), ForceParameters::default());
+        let bytes = postcard::to_stdvec(&settings).expect("encoded").len();
+        let is_known = (MAGIC[VERSION_AT], bytes) == (0x11, 435);
+        assert!(
+            is_known,
+            "{bytes} bytes: increase the version in MAGIC, then correct both numbers"
+        );
+    }
+}
