@@ -186,6 +186,19 @@ mod tests {
         }
     }
 
+    /// Guards against a format that is read and not offered.
+    #[test]
+    fn every_format_of_label_volumes_is_offered() {
+        let names = stylet_files::open::FORMATS.split(['(', ')', ',', ' ']);
+        let endings: Vec<_> = names
+            .filter(|name| name.starts_with('.'))
+            .filter_map(|name| name.rsplit('.').next())
+            .collect();
+        assert!(endings.len() > 5, "{endings:?}");
+        let (_, offered) = Purpose::Scene.formats()[0];
+        assert!(endings.iter().all(|ending| offered.contains(ending)), "{endings:?}");
+    }
+
     #[test]
     fn a_plan_is_saved_in_the_format_that_was_chosen() {
         let named = |purpose, path: &str| with_ending(purpose, PathBuf::from(path));

@@ -347,3 +347,23 @@ fn dose_nrrd(grid: &dicom::dose::ReadDose, identity: Option<&Identity>) -> Vec<u
     grid.dose_gy.iter().for_each(|d| out.extend(d.to_le_bytes()));
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::HELP;
+
+    /// Guards against a format that is read and not on the pages.
+    #[test]
+    fn the_help_and_the_page_name_every_format_of_label_volumes() {
+        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/formats.md");
+        let page = std::fs::read_to_string(page).expect("the page");
+        let names = stylet_files::open::FORMATS.split(['(', ')', ',', ' ']);
+        for ending in names.filter(|name| name.starts_with('.')) {
+            assert!(HELP.contains(ending), "{ending} is not in the help");
+            assert!(
+                page.contains(&format!("`{ending}`")) || ending == ".dcm",
+                "{ending} is not on the page"
+            );
+        }
+    }
+}

@@ -123,3 +123,30 @@ fn scene() {
             .err()
     });
 }
+
+/// Guards against a reader that `make fuzz` leaves out.
+#[test]
+fn every_corpus_has_its_fuzz_target() {
+    let names = |folder: &str| {
+        let entries = std::fs::read_dir(stylet_test_kit::repository(folder)).expect("a folder");
+        let mut names: Vec<_> = entries
+            .map(|e| e.expect("an entry").path())
+            .filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned()))
+            .collect();
+        names.sort();
+        names
+    };
+    let text = |file: &str| std::fs::read_to_string(stylet_test_kit::repository(file)).expect("a file");
+    let corpora = names("tests/files/corpus");
+    assert_eq!(corpora, names("host-ui/fuzz/targets"));
+    let (manifest, script) = (text("host-ui/fuzz/Cargo.toml"), text("docs/tools/fuzz"));
+    let run = script.split_once("${@:-").and_then(|(_, rest)| rest.split_once('}'));
+    let run: Vec<_> = run.expect("the readers by default").0.split(' ').collect();
+    for name in &corpora {
+        assert!(
+            manifest.contains(&format!("\"targets/{name}.rs\"")),
+            "{name} is not built"
+        );
+        assert!(run.contains(&name.as_str()), "{name} is not run");
+    }
+}
