@@ -17,7 +17,7 @@ pub use on_line::step_on_line;
 pub use state::{ChainOutput, ChainParameters, ChainState, Touch};
 
 /// Least stiffness of a stuck shaft, unless the operator set less: the stiffest that every hand holds with three ticks
-/// of delay (`tests/force_envelope.rs`).
+/// of delay (`tests/physics/src/envelope.rs`).
 pub const SOFTEST_STICK_N_PER_M: f64 = 1500.0;
 
 /// The tip in one tick, against its path.
