@@ -27,7 +27,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// Detects the format by the first bytes, whatever the name.
+    /// Detects the format by the first bytes, whatever the name; each format has a function that recognises them.
     pub fn of(bytes: &[u8]) -> Option<Self> {
         type Test = fn(&[u8]) -> bool;
         let tests: [(Self, Test); 4] = [

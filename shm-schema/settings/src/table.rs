@@ -1,4 +1,5 @@
-//! The table: number, name, unit, limits, default and source of every parameter. A new parameter is one row.
+//! The table: number, name, unit, limits, default and source of every parameter. A new parameter is one row here, and a
+//! field of the model that reads it (CONTRIBUTING.md).
 
 use super::{ParameterGroup, ParameterSpec};
 use num_enum::{IntoPrimitive, TryFromPrimitive};
@@ -27,7 +28,8 @@ macro_rules! parameters {
     };
 }
 
-// Limits and defaults are in the unit shown to users.
+// Identifier, key, label, group, unit shown to users, factor from SI to it; least, largest and default value in that
+// unit; source, help. Shared memory and recordings know a row by its place: new ones go to the end.
 parameters! {
     MinStretch "tissue.min_stretch" "Smallest link" Tissue "elements" 1.0, 0.05, 1.0, 0.55, "paper eq. 4", "How far a link between neighbouring elements can be compressed.";
     MaxStretch "tissue.max_stretch" "Largest link" Tissue "elements" 1.0, 1.0, 4.0, 1.75, "paper eq. 3", "How far a link between neighbouring elements can be stretched.";

@@ -1,4 +1,7 @@
 //! The force law, paper eq. 8-10: `F = F_R + F_C + F_G`, all on the operator's hand.
+//!
+//! On a needle line, the default, `crate::line` computes membranes, cutting and friction; guide, damping and weight are
+//! those of this file (`chain/on_line.rs`).
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

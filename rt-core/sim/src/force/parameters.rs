@@ -1,4 +1,4 @@
-//! Settings of the force law, with their validation.
+//! Settings of the force law, with their validation. `crate::active` sets them from the table of parameters.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

@@ -69,7 +69,8 @@ pub struct HandLine {
     bending: Option<Box<Bending>>,
 }
 
-/// Resistance of the layers on the way.
+/// Resistance of the layers on the way: what a line takes of the settings of the force law
+/// (`ChainParameters::layer_forces`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayerForces {
     /// Membrane, cutting and friction of each kind.
