@@ -194,8 +194,9 @@ impl ConvertArgs {
         let mut file = self.read_seeds(self.source()?.as_ref())?;
         let source = match (self.source()?, &file.declared) {
             (Some(source), _) => source,
-            (None, Some(declared)) => Source::known(&declared.model)
-                .ok_or_else(|| format!("no source is known as \"{}\"; give --source FILE", declared.model))?,
+            (None, Some(declared)) => {
+                Source::named(&declared.model).map_err(|why| format!("{why}; give --source FILE"))?
+            }
             (None, None) => return Err("a plan needs --source FILE: DICOM has isotope and half-life in it".into()),
         };
         let agreed = file.agree(&source, None, None);

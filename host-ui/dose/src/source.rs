@@ -4,7 +4,8 @@ use super::curve::{Curve, Table};
 use super::decay::days_to_s;
 use super::error::DoseError;
 use super::tg43::{Capsule, Tables};
-use read::{Anisotropy1d, Anisotropy2d, Model, Problems, Radial, SourceFile};
+use read::{Anisotropy1d, Anisotropy2d, Problems, Radial, SourceFile};
+pub use read::{Model, Reference};
 
 mod read;
 
@@ -27,11 +28,14 @@ pub struct Source {
     pub strength_per_activity_u_per_mci: Option<f64>,
     /// Usual prescription.
     pub prescription_gy: Option<f64>,
+    /// Where the numbers are from.
+    pub reference: Option<Reference>,
 }
 
 /// Sources that need no file.
-const KNOWN: [&str; 2] = [
+const KNOWN: [&str; 3] = [
     include_str!("../../../sources/i125_6711.toml"),
+    include_str!("../../../sources/i125_iai125a.toml"),
     include_str!("../../../sources/pd103_200.toml"),
 ];
 
@@ -44,6 +48,20 @@ impl Source {
     /// Returns all sources of the program.
     pub fn all_known() -> impl Iterator<Item = Self> {
         KNOWN.iter().filter_map(|text| Self::parse(text).ok())
+    }
+
+    /// Returns the file of a source of the program, by its model.
+    pub fn file_of(model: &str) -> Option<&'static str> {
+        let is_model = |text: &&str| Self::parse(text).is_ok_and(|source| source.model == model);
+        KNOWN.into_iter().find(is_model)
+    }
+
+    /// Returns a source of the program by its model; the error lists the models.
+    pub fn named(model: &str) -> Result<Self, DoseError> {
+        Self::known(model).ok_or_else(|| {
+            let known: Vec<String> = Self::all_known().map(|source| source.model).collect();
+            DoseError::Source(format!("source {model:?} is not known; known are {}", known.join(", ")))
+        })
     }
 
     /// Reads and checks the text of a source file; the error lists every problem in it.
@@ -106,6 +124,7 @@ fn build(file: SourceFile, problems: &mut Problems) -> Source {
         nuclide: of.nuclide,
         strength_per_activity_u_per_mci: of.strength_per_activity_u_per_mci,
         prescription_gy: of.prescription_gy,
+        reference: file.reference,
     }
 }
 

@@ -1,5 +1,6 @@
 //! Provenance of a result: each input with its SHA-256, the program with its version, and the time.
 
+use crate::readers::file_of_program;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::io::{Error, Read};
@@ -45,7 +46,10 @@ fn hexadecimal(digest: &[u8]) -> String {
 /// and SHA-256, and with the patient and the frame of reference of a clinical file.
 pub fn made(inputs: &[(&str, &Path)]) -> Result<Value, DigestError> {
     let input = |(option, path): &(&str, &Path)| {
-        let (sha256, bytes) = sha256(path)?;
+        let (sha256, bytes) = match file_of_program(path) {
+            Some(text) => (hexadecimal(&Sha256::digest(text)), text.len() as u64),
+            None => sha256(path)?,
+        };
         let mut input =
             json!({ "option": option, "file": path.display().to_string(), "bytes": bytes, "sha256": sha256 });
         if let Ok(Some(identity)) = Identity::of_path(path) {
@@ -116,6 +120,9 @@ mod tests {
         );
         assert!(made["version"].is_string() && made["made_at"].is_string());
         assert!(super::made(&[("--seeds", &folder.path().join("none"))]).is_err());
+        let of_program = super::made(&[("--source", Path::new("6711"))]).unwrap();
+        let text = file_of_program(Path::new("6711")).unwrap();
+        assert_eq!(of_program["inputs"][0]["bytes"], text.len());
         // A folder by its list, as sha256sum prints it.
         std::fs::write(folder.path().join("empty"), "").unwrap();
         let made = super::made(&[("--images", folder.path())]).unwrap();

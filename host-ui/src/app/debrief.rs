@@ -146,8 +146,7 @@ fn source_of(model: &str, prescription_gy: f64) -> Result<(Source, f64), Failure
     if model.is_empty() {
         return Ok(exchange::usual()?);
     }
-    let source = Source::known(model).ok_or_else(|| format!("unknown source \"{model}\""))?;
-    Ok((source, prescription_gy))
+    Ok((Source::named(model)?, prescription_gy))
 }
 
 impl Delivered {

@@ -1,41 +1,67 @@
 //! The tables of a source file, and their checks; all wrong values are reported together.
 
 use crate::error::DoseError;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 const MAX_ENTRIES: usize = 1000;
 /// Rounding allowed for g(1 cm) and F(90 deg), 1 by definition.
 const ROUNDING: f64 = 0.005;
 
 /// Tables of a source file.
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct SourceFile {
     pub source: Model,
+    pub reference: Option<Reference>,
     pub radial: Radial,
     pub anisotropy_1d: Option<Anisotropy1d>,
     pub anisotropy_2d: Option<Anisotropy2d>,
 }
 
-#[derive(Deserialize)]
+/// Description of a seed model.
+#[derive(Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Model {
+    /// Name of the model.
     pub model: String,
+    /// Isotope, as in I-125.
     pub nuclide: String,
+    /// Half-life, in days.
     pub half_life_days: f64,
-    /// In cGy/h for 1 U.
+    /// Dose rate constant in cGy/h for 1 U.
     pub dose_rate_constant: f64,
+    /// Active length in cm; 0 for a point source.
     #[serde(default)]
     pub active_length_cm: f64,
+    /// Outer length of the capsule, in cm.
     pub physical_length_cm: Option<f64>,
+    /// Outer diameter of the capsule, in cm.
     pub physical_diameter_cm: Option<f64>,
+    /// Reference distance of TG-43, 1 cm.
     pub r0_cm: Option<f64>,
+    /// Reference angle of TG-43, 90 degrees.
     pub theta0_deg: Option<f64>,
+    /// Air kerma strength for an apparent activity of 1 mCi.
     pub strength_per_activity_u_per_mci: Option<f64>,
+    /// Usual prescription.
     pub prescription_gy: Option<f64>,
 }
 
-#[derive(Deserialize)]
+/// Where the numbers of a source are from.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reference {
+    /// Publication of the tables.
+    pub publication: String,
+    /// Digital object identifier of the publication.
+    pub doi: Option<String>,
+    /// Publication of the half-life.
+    pub half_life: Option<String>,
+    /// Copies and figures that the numbers were compared with.
+    pub checked: Option<String>,
+}
+
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Radial {
     pub r_cm: Vec<f64>,
@@ -43,14 +69,14 @@ pub struct Radial {
     pub g_point: Option<Vec<f64>>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Anisotropy1d {
     pub r_cm: Vec<f64>,
     pub phi_an: Vec<f64>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Anisotropy2d {
     pub r_cm: Vec<f64>,

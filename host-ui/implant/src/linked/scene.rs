@@ -155,7 +155,7 @@ pub fn write(
 }
 
 fn known(plan: &ImplantPlan) -> Result<Source, PlanError> {
-    Source::known(&plan.source).ok_or_else(|| PlanError::UnknownSource(plan.source.clone()))
+    Source::named(&plan.source).map_err(PlanError::UnknownSource)
 }
 
 /// Structures with their images and identity.

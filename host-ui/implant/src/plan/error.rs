@@ -57,8 +57,8 @@ pub enum PlanError {
     #[error("the search was cancelled")]
     Cancelled,
     /// A source of another name than those that come with the program.
-    #[error("source {0} is not known")]
-    UnknownSource(String),
+    #[error(transparent)]
+    UnknownSource(DoseError),
     /// The source for files that name none.
     #[error("the usual source is not known")]
     NoUsualSource,

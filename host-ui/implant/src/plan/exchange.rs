@@ -32,7 +32,10 @@ pub fn read(
     let mut notes: Vec<String> = together.notes.into_iter().map(|(_, note)| note).collect();
     let patient = scene.patient();
     if has_ending(path, "toml") {
-        return Ok((file::read(path, &patient)?, notes));
+        let plan = file::read(path, &patient)?;
+        let unknown = Source::named(&plan.source).err();
+        notes.extend(unknown.map(|why| format!("{why}; the window shows the dose of {USUAL_SOURCE}")));
+        return Ok((plan, notes));
     }
     let (usual, usual_gy) = usual()?;
     let defaults = SeedDefaults {

@@ -79,13 +79,13 @@ pub fn write(
 /// Returns the source for the score: the requested one, or the plan's. Refuses one of another
 /// isotope than the plan's.
 pub fn source_of(implant: &ImplantPlan, asked: Option<&Path>) -> Result<Source, ProcedureError> {
-    let of_plan = Source::known(&implant.source);
+    let of_plan = Source::named(&implant.source);
     let Some(path) = asked else {
-        return of_plan.ok_or_else(|| ProcedureError::UnknownSource(implant.source.clone()));
+        return of_plan.map_err(ProcedureError::UnknownSource);
     };
     let source = read_source(path)?;
     let is_other = |planned: &Source| Nuclide::parse(&planned.nuclide) != Nuclide::parse(&source.nuclide);
-    match of_plan.filter(is_other) {
+    match of_plan.ok().filter(is_other) {
         Some(planned) => Err(ProcedureError::OtherIsotope {
             path: path.to_owned(),
             isotope: source.nuclide,

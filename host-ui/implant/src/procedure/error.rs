@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use stylet_base::WriteError;
 use stylet_base::interrupt::InterruptError;
 use stylet_base::output::OutputError;
+use stylet_dose::DoseError;
 use stylet_files::FileError;
 use stylet_host::link::LinkError;
 use stylet_shm_schema::{MAX_SEEDS, Refusal};
@@ -63,8 +64,8 @@ pub enum ProcedureError {
     #[error(transparent)]
     Signals(#[from] InterruptError),
     /// The source of the plan is unknown.
-    #[error("unknown source \"{0}\"; give --source FILE")]
-    UnknownSource(String),
+    #[error("{0}; give --source FILE")]
+    UnknownSource(DoseError),
     /// The source is of another isotope than the plan's.
     #[error(
         "{}: it is {} and the plan is for {} (model \"{}\"); leave --source out, or choose one of that isotope",

@@ -14,5 +14,5 @@ pub use columns::{Mapped, NotAColumn};
 pub use declared::{Declared, Mismatch};
 pub use grid::{at_gy, is_dose_volume, places_m, read_any_dose};
 pub use seeds::{SeedDefaults, SeedFile, dose_seed, read_seeds};
-pub use source::read_source;
+pub use source::{file_of_program, read_source};
 pub use table::read_points;

@@ -134,8 +134,7 @@ impl Moment {
     }
 
     fn source(&self) -> Result<Source, Failure> {
-        let model = &self.plan.source;
-        Source::known(model).ok_or_else(|| format!("source {model} is unknown").into())
+        Ok(Source::named(&self.plan.source)?)
     }
 
     /// Computes the dose of the placed seeds, now and with the plan continued.
