@@ -28,6 +28,7 @@ pub const PRODUCTS: [Product; 2] = [
             "perturb",
             "study",
             "class",
+            "sources",
         ],
     },
     Product {

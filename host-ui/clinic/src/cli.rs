@@ -11,6 +11,7 @@ use crate::perturb::PerturbArgs;
 use crate::plan::PlanArgs;
 use crate::post_implant::PostImplantArgs;
 use crate::scene;
+use crate::sources::SourcesArgs;
 use crate::study::StudyArgs;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::PathBuf;
@@ -53,6 +54,8 @@ enum Task {
     Study(StudyArgs),
     /// Compare the trainees of a class and their progress: a page and a table
     Class(ClassArgs),
+    /// List the sources of the program with their publications, or import one from published tables
+    Sources(SourcesArgs),
     /// Write the man pages and shell completions of this program
     Manual(ManualArgs),
 }
@@ -90,6 +93,7 @@ impl Cli {
             Task::Perturb(args) => args.run(),
             Task::Study(args) => args.run(),
             Task::Class(args) => args.run(),
+            Task::Sources(args) => args.run(),
             Task::Manual(args) => Ok(args.run(Self::command())?),
         }
     }

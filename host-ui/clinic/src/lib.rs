@@ -18,5 +18,6 @@ mod plan;
 mod post_implant;
 mod scene;
 mod sheet;
+mod sources;
 mod study;
 mod trainees;

@@ -55,7 +55,7 @@ pub struct PlanArgs {
     /// Start this rt-core when none is running, and end it afterwards
     #[arg(long, value_name = "PATH")]
     core: Option<PathBuf>,
-    /// Source file (TOML), like those in sources/
+    /// Source file (TOML), or the model of a source that 'host-ui sources' lists
     #[arg(long, value_name = "FILE")]
     source: PathBuf,
     /// Prescribed dose in Gy [default: that of the seeds' plan, or else of the source file]

@@ -33,6 +33,7 @@
 //! `wasm32-unknown-unknown`, too.
 #![warn(missing_docs)]
 
+pub mod along_away;
 pub mod criteria;
 pub mod criterion;
 pub mod curve;

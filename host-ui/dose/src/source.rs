@@ -8,6 +8,7 @@ use read::{Anisotropy1d, Anisotropy2d, Problems, Radial, SourceFile};
 pub use read::{Model, Reference};
 
 mod read;
+pub mod sheet;
 
 const M_PER_CM: f64 = 0.01;
 /// 1 cGy/h in Gy/s.

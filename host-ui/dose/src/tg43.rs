@@ -72,6 +72,29 @@ impl Tables {
             * anisotropy
     }
 
+    /// Returns the mean dose rate over all directions relative to that at 90 degrees: φ_an by eq. 8 of
+    /// TG-43U1, by the midpoint rule in steps of 0.05 degrees.
+    pub fn mean_over_directions(&self, r_m: f64) -> f64 {
+        const STEPS: u32 = 3600;
+        let step = std::f64::consts::PI / f64::from(STEPS);
+        let rate = |angle: f64| self.rate_gy_per_s(Formalism::TwoD, r_m * angle.sin(), r_m * angle.cos());
+        let angles = (0..STEPS).map(|i| (f64::from(i) + 0.5) * step);
+        let whole: f64 = angles.map(|angle| rate(angle) * angle.sin() * step).sum();
+        whole / 2.0 / rate(std::f64::consts::FRAC_PI_2)
+    }
+
+    /// Returns the distances (m) that both g and F have, the least and the largest.
+    pub fn radii_m(&self) -> [f64; 2] {
+        let ends = |at: &[f64]| Some([*at.first()?, *at.last()?]);
+        let of_g = ends(&self.ln_radial.at).unwrap_or_default();
+        let of_f = self
+            .anisotropy_2d
+            .as_ref()
+            .and_then(|f| ends(&f.rows_at))
+            .unwrap_or(of_g);
+        [of_g[0].max(of_f[0]), of_g[1].min(of_f[1])]
+    }
+
     /// Returns G_L in 1/m²: `β / (L across)`, with β the angle under which the active line is seen.
     fn geometry(&self, across_m: f64, along_m: f64) -> f64 {
         let length = self.active_length_m;
@@ -86,6 +109,11 @@ impl Tables {
 }
 
 impl Capsule {
+    /// Returns whether a point lies inside.
+    pub fn holds(&self, across_m: f64, along_m: f64) -> bool {
+        self.outside(across_m, along_m) != (across_m, along_m)
+    }
+
     /// Returns the point itself, or the nearest one on the surface if it lies inside.
     fn outside(&self, across_m: f64, along_m: f64) -> (f64, f64) {
         let to_side = self.radius_m - across_m;

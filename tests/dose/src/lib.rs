@@ -7,4 +7,6 @@ mod grid;
 #[cfg(test)]
 mod source;
 #[cfg(test)]
+mod sources;
+#[cfg(test)]
 mod tg43;

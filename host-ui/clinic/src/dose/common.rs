@@ -22,7 +22,7 @@ use stylet_population as population;
 /// Options of all commands that compute dose.
 #[derive(Args, Debug)]
 pub struct Common {
-    /// Source file (TOML), like those in sources/
+    /// Source file (TOML), or the model of a source that 'host-ui sources' lists
     #[arg(long, value_name = "FILE")]
     pub source: PathBuf,
     /// Strength in U of seeds whose file gives none
