@@ -224,7 +224,7 @@ fn try_real_time() -> Result<(), Refused> {
     // Otherwise this thread would leave its own heap to later threads.
     arm::keep_one_heap();
     let armed = std::thread::spawn(move || arm::arm(ask).map(drop)).join();
-    armed.unwrap_or_else(|_| Err(Refused::Trial))?;
+    armed.unwrap_or(Err(Refused::Trial))?;
     // SAFETY: both calls have no preconditions; what is locked now is unlocked again.
     let lockable = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0 && libc::munlockall() == 0 };
     if lockable {
