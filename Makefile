@@ -6,6 +6,8 @@ RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),
 BIN := $(or $(CARGO_TARGET_DIR),target)/quick
 SIMULATOR = --bin rt-core --bin stylet-bridge --bin host-ui
 PRODUCTS = --bin stylet-lab --bin stylet-study --bin stylet-clinic --bin stylet-igtl
+# Decoders of JPEG, JPEG-LS and JPEG 2000: in the packages, not in what is built to develop.
+COMPRESSED = --features stylet-files/compressed
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
 .PHONY: attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
@@ -34,9 +36,10 @@ test: deps-test products ## Install what the tests need, test the simulator, and
 test-all: test ## Then test the products, and the programs with whole processes, windows and other programs' files
 	$(CARGO) build --profile quick $(REST) --all-targets
 	$(CARGO) test --profile quick $(REST) $(RUNNER)
+	$(CARGO) test --profile quick -p stylet-files --lib $(COMPRESSED) -- compressed::
 
 build-release: ## Build the programs as the packages hold them, with every dependency optimised
-	$(CARGO) build --release --workspace $(SIMULATOR) $(PRODUCTS)
+	$(CARGO) build --release --workspace $(SIMULATOR) $(PRODUCTS) $(COMPRESSED)
 
 package: deps-package build-release ## Build the Debian packages of both programs, into target/package
 	docs/tools/package "$(SHIPPED)"

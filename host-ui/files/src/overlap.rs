@@ -73,9 +73,14 @@ pub fn in_cc(m3: f64) -> String {
 
 /// Returns the volume with one more warning for the user.
 pub fn with_warning(mut voxels: Voxels, warning: Option<String>) -> Voxels {
-    voxels.frame.warning = match (voxels.frame.warning.take(), warning) {
+    voxels.frame.warning = joined(voxels.frame.warning.take(), warning);
+    voxels
+}
+
+/// Returns two remarks as one.
+pub fn joined(one: Option<String>, other: Option<String>) -> Option<String> {
+    match (one, other) {
         (Some(one), Some(other)) => Some(format!("{one}; {other}")),
         (one, other) => one.or(other),
-    };
-    voxels
+    }
 }

@@ -186,7 +186,7 @@ fn of_dose(object: &checked::Object, pixels: &[u8]) -> Answer {
 fn of_image(object: &checked::Object, pixels: &[u8]) -> Answer {
     let beside = file_bytes(series::tests::slice("2.25.4", 1)).unwrap();
     let (beside, its_pixels, endian) = checked::read_with_pixels(&beside).unwrap();
-    let frames = [(object, pixels), (&beside, its_pixels)];
+    let frames = [(object, pixels), (&beside, &*its_pixels)];
     let frames = frames.map(|(object, pixels)| series::frame_of(object, pixels, endian));
     let frames: Result<Vec<series::Frame>, _> = frames.into_iter().collect();
     let volume = frames.and_then(series::volume).map_err(|why| why.to_string())?;

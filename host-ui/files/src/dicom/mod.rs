@@ -7,6 +7,7 @@ mod agree;
 mod attributes;
 mod charset;
 mod checked;
+mod compressed;
 pub mod dose;
 mod identity;
 pub mod images;
@@ -16,6 +17,7 @@ pub mod plan;
 pub mod series;
 pub mod structures;
 mod values;
+mod walk;
 mod write;
 
 pub use agree::{Agreed, Shared, agree};

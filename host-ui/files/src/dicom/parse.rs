@@ -1,7 +1,7 @@
 //! The elements of a checked data set, with their texts decoded by the declared character sets.
 
 use super::charset::{self, Sets};
-use super::checked::Syntax;
+use super::walk::Syntax;
 use crate::error::ContentError;
 use dicom_core::Tag;
 use dicom_dictionary_std::uids;

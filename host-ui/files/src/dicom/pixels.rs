@@ -2,8 +2,9 @@
 
 use super::super::Progress;
 use super::super::element::{Element, Endian, Sink, read_values, short};
-use super::values::{given, name, needed, number, text};
+use super::values::{given, items, name, needed, number, text};
 use crate::error::{ContentError, invalid};
+use dicom_core::Tag;
 use dicom_dictionary_std::tags;
 use dicom_object::InMemDicomObject;
 use nalgebra::Vector3;
@@ -39,6 +40,49 @@ impl Plane {
     /// Returns the steps from column to column, and from row to row.
     pub fn steps(&self) -> [Vector3<f64>; 2] {
         [0, 1].map(|n| self.directions[n] * self.pitch[n])
+    }
+}
+
+/// Most frames of one file.
+const MAX_FRAMES: f64 = 65_535.0;
+
+/// Attributes of one frame of several in a file: its own, and those of all frames.
+pub struct Groups<'a> {
+    /// Its own attributes.
+    pub own: &'a InMemDicomObject,
+    shared: Option<&'a InMemDicomObject>,
+}
+
+impl<'a> Groups<'a> {
+    /// Returns the attributes of every frame.
+    pub fn of(data: &'a InMemDicomObject) -> Result<Vec<Self>, ContentError> {
+        let count = needed(data, tags::NUMBER_OF_FRAMES, 1.0, MAX_FRAMES)? as usize;
+        let own = items(data, tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE);
+        if own.len() != count {
+            return Err(invalid!(
+                "it says {count} frames and describes {}; export it again",
+                own.len()
+            ));
+        }
+        let shared = items(data, tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE).first();
+        Ok(own.iter().map(|own| Self { own, shared }).collect())
+    }
+
+    /// Returns a group of attributes.
+    pub fn get(&self, sequence: Tag) -> Option<&'a InMemDicomObject> {
+        let of = |groups: &'a InMemDicomObject| items(groups, sequence).first();
+        of(self.own).or_else(|| self.shared.and_then(of))
+    }
+
+    /// Returns place and directions of the frame.
+    pub fn plane(&self) -> Result<Plane, ContentError> {
+        let nothing = InMemDicomObject::new_empty();
+        let group = |sequence| self.get(sequence).unwrap_or(&nothing);
+        Plane::of(
+            group(tags::PLANE_POSITION_SEQUENCE),
+            group(tags::PLANE_ORIENTATION_SEQUENCE),
+            group(tags::PIXEL_MEASURES_SEQUENCE),
+        )
     }
 }
 

@@ -3,11 +3,12 @@
 use super::super::Progress;
 use super::super::bytes;
 use super::super::element::{Endian, MAX_IMAGE_VOXELS, short};
+use super::super::overlap::joined;
 use super::super::progress::Stage;
 use super::super::volume::VoxelValues;
 use super::images::{self, Slice};
-use super::pixels::{self, Pixel, Plane};
-use super::values::{items, name, needed, number, text};
+use super::pixels::{self, Groups, Pixel};
+use super::values::{items, name, number, text};
 use super::{Identity, Object, checked};
 use crate::error::{ContentError, FileError, invalid};
 use dicom_core::Tag;
@@ -15,9 +16,6 @@ use dicom_dictionary_std::tags;
 use dicom_object::InMemDicomObject;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-/// Most frames of one file.
-const MAX_FRAMES: f64 = 65_535.0;
 
 /// Reads the only series of a folder, or the series of the file `path`: its values, such as
 /// Hounsfield units.
@@ -36,7 +34,7 @@ fn of_path(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, Content
             let file = bytes::whole(path, progress)?;
             let (object, pixels, endian) = checked::read_with_pixels(&file)?;
             match is_enhanced(&object) {
-                true => enhanced(&object, pixels, endian, progress)?,
+                true => enhanced(&object, &pixels, endian, progress)?,
                 false => rest_of_series(path, &object, progress)?,
             }
         }
@@ -47,7 +45,9 @@ fn of_path(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, Content
 /// Returns the volume of the slices of one series, in any order.
 pub(super) fn volume(mut frames: Vec<Frame>) -> Result<VoxelValues<f32>, ContentError> {
     let slices: Vec<Slice> = frames.iter().map(|frame| frame.slice.clone()).collect();
-    let grid = images::grid(slices)?.ok_or("it is one slice alone; a volume has at least two")?;
+    let mut grid = images::grid(slices)?.ok_or("it is one slice alone; a volume has at least two")?;
+    let loss = frames.iter_mut().find_map(|frame| frame.loss.take());
+    grid.frame.warning = joined(grid.frame.warning.take(), loss);
     let [columns, rows, _] = grid.dims;
     // In the order of the grid.
     images::sort(&mut frames, |frame| &frame.slice);
@@ -71,9 +71,10 @@ pub fn modality(path: &Path) -> Result<Option<(String, String)>, FileError> {
     };
     let of_image = |file: &PathBuf| {
         let content = bytes::whole(file, &Progress::default()).ok()?;
-        let data = checked::read_head(&content).ok()?.data;
-        data.get(tags::ROWS)?;
-        let of = |tag: Tag| text(&data, tag).unwrap_or_default();
+        let object = checked::read_head(&content).ok()?;
+        let data = &object.data;
+        data.get(tags::ROWS).filter(|_| !is_of_images(&object))?;
+        let of = |tag: Tag| text(data, tag).unwrap_or_default();
         Some((of(tags::MODALITY), of(tags::RESCALE_TYPE)))
     };
     Ok(files
@@ -86,6 +87,8 @@ pub fn modality(path: &Path) -> Result<Option<(String, String)>, FileError> {
 pub(super) struct Frame {
     slice: Slice,
     values: Vec<f32>,
+    /// Remark on compression with loss.
+    loss: Option<String>,
 }
 
 /// Returns the slices of the only series of a folder, or of the series `wanted`.
@@ -110,7 +113,7 @@ fn of_folder(folder: &Path, wanted: Option<&str>, progress: &Progress) -> Result
             continue;
         };
         let is_image = data.get(tags::IMAGE_POSITION_PATIENT).is_some() || is_enhanced(&object);
-        if is_image && object.sop_class != super::RT_DOSE {
+        if is_image && !is_of_images(&object) {
             let about = || {
                 let of = |tag: Tag| text(data, tag).unwrap_or_default();
                 format!("{} \"{}\"", of(tags::MODALITY), short(&of(tags::SERIES_DESCRIPTION)))
@@ -176,10 +179,10 @@ fn frames_of(paths: &[PathBuf], progress: &Progress) -> Result<Vec<Frame>, Conte
         let file = bytes::whole(path, &Progress::default())?;
         let (object, pixels, endian) = checked::read_with_pixels(&file).map_err(within)?;
         if is_enhanced(&object) {
-            frames.extend(enhanced(&object, pixels, endian, progress).map_err(within)?);
+            frames.extend(enhanced(&object, &pixels, endian, progress).map_err(within)?);
             continue;
         }
-        let frame = frame_of(&object, pixels, endian).map_err(within)?;
+        let frame = frame_of(&object, &pixels, endian).map_err(within)?;
         check_size(frame.values.len(), paths.len())?;
         frames.push(frame);
     }
@@ -194,6 +197,7 @@ pub(super) fn frame_of(object: &Object, pixels: &[u8], endian: Endian) -> Result
     Ok(Frame {
         slice,
         values: scaled(values, scale),
+        loss: object.loss.clone(),
     })
 }
 
@@ -205,6 +209,11 @@ fn modality_of(object: &Object) -> Result<String, ContentError> {
         )
     };
     text(&object.data, tags::MODALITY).ok_or_else(missing)
+}
+
+/// Returns whether the pixels of an object are a dose, not images of a series.
+fn is_of_images(object: &Object) -> bool {
+    object.sop_class == super::RT_DOSE
 }
 
 fn is_enhanced(object: &Object) -> bool {
@@ -246,15 +255,8 @@ fn check_size(of_slice: usize, slices: usize) -> Result<(), ContentError> {
 /// Reads the frames of an enhanced image: common attributes stand once, the others with each frame.
 fn enhanced(object: &Object, pixels: &[u8], endian: Endian, progress: &Progress) -> Result<Vec<Frame>, ContentError> {
     let data = &object.data;
-    let count = needed(data, tags::NUMBER_OF_FRAMES, 1.0, MAX_FRAMES)? as usize;
-    let own = items(data, tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE);
-    if own.len() != count {
-        return Err(invalid!(
-            "it says {count} frames and describes {}; export it again",
-            own.len()
-        ));
-    }
-    let shared = items(data, tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE).first();
+    let groups = Groups::of(data)?;
+    let count = groups.len();
     let size = pixels::size(data)?;
     let pixel = Pixel::of(data)?;
     let of_frame = size[0] * size[1];
@@ -263,23 +265,16 @@ fn enhanced(object: &Object, pixels: &[u8], endian: Endian, progress: &Progress)
     let series = text(data, tags::SERIES_INSTANCE_UID).unwrap_or_default();
     let modality = modality_of(object)?;
     let mut frames = Vec::new();
-    for (n, groups) in own.iter().enumerate() {
+    for (n, groups) in groups.iter().enumerate() {
         progress.report(Stage::Voxels, n, count)?;
-        let group = |sequence: Tag| {
-            let of = |groups: &InMemDicomObject| items(groups, sequence).first().cloned();
-            of(groups).or_else(|| shared.and_then(of))
-        };
-        let attributes = |sequence: Tag| group(sequence).unwrap_or_else(InMemDicomObject::new_empty);
-        let place = attributes(tags::PLANE_POSITION_SEQUENCE);
-        let is_relative = !items(groups, tags::PLANE_POSITION_VOLUME_SEQUENCE).is_empty();
-        if is_relative && place.get(tags::IMAGE_POSITION_PATIENT).is_none() {
+        let place = groups.get(tags::PLANE_POSITION_SEQUENCE);
+        let is_relative = !items(groups.own, tags::PLANE_POSITION_VOLUME_SEQUENCE).is_empty();
+        if is_relative && place.and_then(|p| p.get(tags::IMAGE_POSITION_PATIENT)).is_none() {
             return Err("its frames are positioned relative to the probe, not the patient; export it as NRRD".into());
         }
-        let [turn, spacing] = [tags::PLANE_ORIENTATION_SEQUENCE, tags::PIXEL_MEASURES_SEQUENCE].map(attributes);
-        let plane = Plane::of(&place, &turn, &spacing);
+        let plane = groups.plane();
         let plane = plane.map_err(|why| why.within(format_args!("frame {}", n + 1)))?;
-        let scale = group(tags::PIXEL_VALUE_TRANSFORMATION_SEQUENCE);
-        let scale = scale_of(scale.as_ref(), &modality)?;
+        let scale = scale_of(groups.get(tags::PIXEL_VALUE_TRANSFORMATION_SEQUENCE), &modality)?;
         let raw = pixels.get(n * bytes..(n + 1) * bytes).ok_or_else(|| {
             invalid!(
                 "it is truncated: frame {} of {count} is missing; copy or export it again",
@@ -288,7 +283,8 @@ fn enhanced(object: &Object, pixels: &[u8], endian: Endian, progress: &Progress)
         })?;
         let values = scaled(pixel.values(raw, endian, of_frame)?, scale);
         let slice = Slice::new((series.clone(), Identity::of(object)), &plane, size);
-        frames.push(Frame { slice, values });
+        let loss = object.loss.clone();
+        frames.push(Frame { slice, values, loss });
     }
     Ok(frames)
 }

@@ -1,6 +1,7 @@
 //! Truncated and corrupted files.
 
 use super::super::plan::{PlanSeed, PlanSource, SeedPlan, bytes, of};
+use super::super::walk::MAX_DEPTH;
 use super::super::{Identity, new_uid};
 use super::*;
 

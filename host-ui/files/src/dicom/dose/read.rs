@@ -49,7 +49,7 @@ pub fn of_file(path: &Path) -> Result<ReadDose, FileError> {
     let refused = |why| FileError::of(path, why);
     let bytes = crate::bytes::whole(path, &Progress::default()).map_err(refused)?;
     let (object, pixels, endian) = checked::read_with_pixels(&bytes).map_err(refused)?;
-    of(&object, pixels, endian).map_err(refused)
+    of(&object, &pixels, endian).map_err(refused)
 }
 
 pub(in crate::dicom) fn of(object: &Object, pixels: &[u8], endian: Endian) -> Result<ReadDose, ContentError> {
@@ -74,7 +74,8 @@ pub(in crate::dicom) fn of(object: &Object, pixels: &[u8], endian: Endian) -> Re
         let item = items(data, tag).first()?;
         text(item, tags::REFERENCED_SOP_INSTANCE_UID)
     };
-    let (kind, notes) = DoseKind::of(data)?;
+    let (kind, mut notes) = DoseKind::of(data)?;
+    notes.extend(object.loss.clone());
     let values: Vec<f64> = raw.iter().map(|value| value * scaling).collect();
     Ok(ReadDose {
         uid: text(data, tags::SOP_INSTANCE_UID).unwrap_or_default(),
