@@ -65,7 +65,8 @@ enum SceneTask {
     /// Read a volume or a scene file and print what would be sent to rt-core
     #[command(after_long_help = scene::HELP)]
     Check {
-        /// NIfTI-1, NRRD (also Slicer's .seg.nrrd), MetaImage, DICOM RT Structure Set, or a scene file (.toml)
+        /// NIfTI-1, NRRD (also Slicer's .seg.nrrd), MetaImage, DICOM RT Structure Set or Segmentation, or a scene
+        /// file (.toml)
         file: PathBuf,
         /// Label of the gland [default: all but 0]
         #[arg(long, value_name = "N")]

@@ -11,6 +11,7 @@ use stylet_dose::Source;
 use stylet_files::convert::{can_hold_labels, write_labels};
 use stylet_files::dicom::images::Slice;
 use stylet_files::dicom::plan::{self, SeedPlan};
+use stylet_files::dicom::segmentation::{self, is_segmentation};
 use stylet_files::dicom::structures::write::{Outlined, Written, of_set, of_voxels};
 use stylet_files::dicom::structures::{self, StructureSet};
 use stylet_files::dicom::{self, Identity, RT_DOSE, RT_PLAN, Shared};
@@ -24,8 +25,8 @@ const MAX_PLAN_BYTES: u64 = 4 << 20;
 
 const HELP: &str = "\
 Conversions:
-  label volume   .nii .nii.gz .nrrd .nhdr .seg.nrrd .mha .mhd, .dcm (RT Structure Set, with its images in the same folder)
-                 into .nrrd .seg.nrrd .mha .nii.gz, .dcm (RT Structure Set)
+  label volume   .nii .nii.gz .nrrd .nhdr .seg.nrrd .mha .mhd, .dcm (RT Structure Set, with its images in the same folder;
+                 Segmentation) into .nrrd .seg.nrrd .mha .nii.gz, .dcm (RT Structure Set), .seg.dcm (Segmentation)
   seed plan      .csv (columns as for host-ui dose) into .dcm (RT Plan; needs --source), and back;
                  .toml (plan of host-ui) into .dcm or .csv; .dcm into .dcm
   dose           .csv (dose_grid.csv of host-ui dose) into .dcm (RT Dose; needs --plan) or .nrrd;
@@ -41,6 +42,7 @@ Losses (overlaps, structures without volume) are reported.
 Examples:
   host-ui convert rtstruct.dcm gland.seg.nrrd
   host-ui convert gland.seg.nrrd rtstruct.dcm
+  host-ui convert gland.seg.nrrd gland.seg.dcm --like ct/slice001.dcm
   host-ui convert seeds.csv plan.dcm --source sources/i125_6711.toml --strength-u 0.5
   host-ui convert plan.dcm seeds.csv
   host-ui convert plan.toml plan.dcm
@@ -95,7 +97,7 @@ impl ConvertArgs {
         let to_dicom = has_ending(&self.to, "dcm");
         if !to_dicom && !can_hold_labels(&self.to) {
             return Err(format!(
-                "{}: a label volume is written as .nrrd, .seg.nrrd, .mha, .nii.gz or .dcm; see host-ui convert --help",
+                "{}: a label volume is written as .nrrd, .seg.nrrd, .mha, .nii.gz, .dcm or .seg.dcm; see host-ui convert --help",
                 self.to.display()
             )
             .into());
@@ -103,7 +105,9 @@ impl ConvertArgs {
         if scene::is_scene(&self.from) {
             return Err(format!("{}: give the volume that the scene file names", self.from.display()).into());
         }
-        if to_dicom && dicom_class(&self.from)?.is_some() {
+        let to_segmentation = bytes::file_name(&self.to).to_ascii_lowercase().ends_with(".seg.dcm");
+        let class = dicom_class(&self.from)?;
+        if to_dicom && !to_segmentation && class.is_some_and(|class| !is_segmentation(&class)) {
             return self.structures_again();
         }
         let identity = self.identity()?;
@@ -113,8 +117,13 @@ impl ConvertArgs {
         for note in voxels.frame.warning.iter().chain(lost) {
             seeds::report(&self.from, std::slice::from_ref(note));
         }
-        if to_dicom {
-            let structures = of_voxels(&voxels).map_err(|why| FileError::of(&self.to, why))?;
+        let refused = |why| FileError::of(&self.to, why);
+        if to_segmentation {
+            let identity = identity.unwrap_or_default().completed();
+            let content = segmentation::write::bytes(&voxels, &identity).map_err(refused)?;
+            write_whole(&self.to, &content)?;
+        } else if to_dicom {
+            let structures = of_voxels(&voxels).map_err(refused)?;
             self.write_structures(&identity.unwrap_or_default().completed(), &[], &structures)?;
         } else {
             write_labels(&voxels, &self.to, identity.as_ref())?;

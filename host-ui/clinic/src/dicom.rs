@@ -50,7 +50,7 @@ pub struct DicomArgs {
     /// Seeds: CSV, a plan of host-ui (.toml), or a DICOM RT Plan; see `host-ui dose --help`
     #[arg(long, value_name = "FILE")]
     seeds: PathBuf,
-    /// Structures: NIfTI-1, NRRD, MetaImage or a DICOM RT Structure Set
+    /// Structures: NIfTI-1, NRRD, MetaImage, DICOM RT Structure Set or Segmentation
     #[arg(long, value_name = "FILE")]
     structures: PathBuf,
     /// Folder with the image series of the contours [default: that of the structure set]
@@ -121,8 +121,9 @@ impl DicomArgs {
         let path = &self.structures;
         let refused = |why| FileError::of(path, why);
         let content = watched(path, |progress| bytes::whole(path, progress)).map_err(refused)?;
-        if !dicom::is_dicom(&content) {
+        let Some(object) = dicom::drawn(&content).map_err(refused)? else {
             let mut voxels = watched(path, |progress| read_voxels(path, progress))?;
+            seeds::report(path, voxels.frame.warning.as_slice());
             voxels.names.extend(self.common.label_names()?);
             let images = match &self.images {
                 Some(folder) => one_series(folder)?,
@@ -132,8 +133,7 @@ impl DicomArgs {
                 structures: of_voxels(&voxels).map_err(refused)?,
                 images,
             });
-        }
-        let object = dicom::read(&content).map_err(refused)?;
+        };
         let set = StructureSet::of(&object).map_err(refused)?;
         let images = match &self.images {
             Some(folder) => one_series(folder)?,

@@ -57,7 +57,7 @@ pub struct DoseArgs {
     /// Points for the dose (CSV: x_mm,y_mm,z_mm)
     #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
-    /// Structures: NIfTI-1, NRRD, MetaImage or a DICOM RT Structure Set
+    /// Structures: NIfTI-1, NRRD, MetaImage, DICOM RT Structure Set or Segmentation
     #[arg(long, value_name = "FILE")]
     structures: Option<PathBuf>,
     /// Side of the voxels of the grid

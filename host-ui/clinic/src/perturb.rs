@@ -54,7 +54,7 @@ pub struct PerturbArgs {
     /// Planned seeds: CSV, a plan of host-ui (.toml), or a DICOM RT Plan; see `host-ui dose --help`
     #[arg(long, value_name = "FILE")]
     plan: PathBuf,
-    /// Structures: NIfTI-1, NRRD, MetaImage or a DICOM RT Structure Set
+    /// Structures: NIfTI-1, NRRD, MetaImage, DICOM RT Structure Set or Segmentation
     #[arg(long, value_name = "FILE")]
     structures: PathBuf,
     /// Standard deviation of a seed's error along each axis

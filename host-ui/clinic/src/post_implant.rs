@@ -42,7 +42,7 @@ pub struct PostImplantArgs {
     /// Planned seeds: CSV, a plan of host-ui (.toml), or a DICOM RT Plan
     #[arg(long, value_name = "FILE")]
     planned: PathBuf,
-    /// Structures of the plan: NIfTI-1, NRRD, MetaImage or a DICOM RT Structure Set
+    /// Structures of the plan: NIfTI-1, NRRD, MetaImage, DICOM RT Structure Set or Segmentation
     #[arg(long, value_name = "FILE")]
     structures: PathBuf,
     /// Delivered seeds, in the frame of the plan

@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Formats of label volumes, for display.
-pub const FORMATS: &str =
-    "NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr, .seg.nrrd), MetaImage (.mha, .mhd), DICOM RT Structure Set (.dcm)";
+pub const FORMATS: &str = "NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr, .seg.nrrd), MetaImage (.mha, .mhd), \
+     DICOM RT Structure Set and Segmentation (.dcm)";
 
 /// Content of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +47,7 @@ pub fn read_voxels(path: &Path, progress: &Progress) -> Result<Voxels, FileError
     let sink = Sink::labels(progress);
     let data = |name: &str| data_file(path, name, progress);
     let voxels = match Format::of(&bytes) {
-        Some(Format::Dicom) => dicom::read(&bytes).and_then(|object| dicom::structures::read(&object, folder(path))),
+        Some(Format::Dicom) => dicom::labels(&bytes, folder(path)),
         Some(Format::Nrrd) => nrrd::read(&bytes, &data, sink),
         Some(Format::Nifti) => nifti::read(&bytes, sink).map(|v| v.named(BTreeMap::new())),
         Some(Format::MetaImage) => metaimage::read(&bytes, &data, sink).map(|v| v.named(BTreeMap::new())),

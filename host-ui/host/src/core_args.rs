@@ -12,7 +12,7 @@ pub struct CoreArgs {
     #[arg(long, default_value = "main", value_parser = Instance::new)]
     pub instance: Instance,
     /// What to run instead of rt-core's scene: paper, pelvis or full, which are built in, or a volume: NIfTI-1, NRRD,
-    /// MetaImage, DICOM RT Structure Set, or a scene file (.toml)
+    /// MetaImage, DICOM RT Structure Set or Segmentation, or a scene file (.toml)
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<SceneChoice>,
     /// Which label of the volume is the gland [default: all but 0]

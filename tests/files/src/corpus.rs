@@ -101,6 +101,11 @@ fn structures() {
 }
 
 #[test]
+fn segmentation() {
+    replay("segmentation", |b| files::dicom::segmentation::read(b).err());
+}
+
+#[test]
 fn plan() {
     replay("plan", |b| {
         files::dicom::read(b).and_then(|o| files::dicom::plan::of(&o)).err()

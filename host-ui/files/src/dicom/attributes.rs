@@ -7,7 +7,7 @@ use super::structures::StructureSet;
 use super::structures::write::{Outlined, Written};
 use super::values::items;
 use super::write::{bytes as file_bytes, sequence};
-use super::{Identity, checked, dose, plan, series, structures};
+use super::{Identity, checked, dose, plan, segmentation, series, structures};
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::header::Header;
 use dicom_core::value::{PrimitiveValue, Value};
@@ -25,7 +25,7 @@ const NUMBER: &str = "STYLET_ATTRIBUTES";
 type Answer = Result<(Vec<f64>, Vec<String>), String>;
 
 /// Values that contradict another attribute of the same object.
-const CONTRADICTIONS: [(Tag, &str); 20] = [
+const CONTRADICTIONS: [(Tag, &str); 24] = [
     (tags::NUMBER_OF_CONTOUR_POINTS, "3"),
     (tags::REFERENCED_ROI_NUMBER, "2"),
     (tags::ROI_NUMBER, "2"),
@@ -46,6 +46,10 @@ const CONTRADICTIONS: [(Tag, &str); 20] = [
     (tags::HIGH_BIT, "11"),
     (tags::SAMPLES_PER_PIXEL, "3"),
     (tags::SOURCE_ISOTOPE_NAME, "Pd-103"),
+    (tags::SEGMENT_NUMBER, "2"),
+    (tags::REFERENCED_SEGMENT_NUMBER, "2"),
+    (tags::SEGMENTATION_TYPE, "FRACTIONAL"),
+    (tags::SPACING_BETWEEN_SLICES, "1.25"),
 ];
 
 struct Random(u64);
@@ -182,6 +186,15 @@ fn of_dose(object: &checked::Object, pixels: &[u8]) -> Answer {
     Ok((figures, dose.notes))
 }
 
+fn of_segmentation(object: &checked::Object, pixels: &[u8]) -> Answer {
+    let v = segmentation::of(object, pixels, Endian::Little).map_err(|why| why.to_string())?;
+    let mut figures = v.dims.map(|d| d as f64).to_vec();
+    figures.extend(v.labels.iter().map(|label| f64::from(*label)));
+    figures.extend(v.frame.columns_m().iter().chain(&v.frame.origin_m));
+    figures.extend(v.names.values().flat_map(|name| name.bytes().map(f64::from)));
+    Ok((figures, v.frame.warning.into_iter().chain(v.overlap).collect()))
+}
+
 /// Reads a damaged slice of a CT together with the whole one beside it.
 fn of_image(object: &checked::Object, pixels: &[u8]) -> Answer {
     let beside = file_bytes(series::tests::slice("2.25.4", 1)).unwrap();
@@ -280,6 +293,11 @@ fn damaged_attributes_are_harmless_refused_or_named() {
         ),
         ("plan", plan::bytes(&plan::tests::plan(5)).unwrap(), of_plan),
         ("dose", dose::bytes(&image, &of).unwrap(), of_dose),
+        (
+            "segmentation",
+            segmentation::write::bytes(&segmentation::tests::volume(false), &identity).unwrap(),
+            of_segmentation,
+        ),
         (
             "image",
             file_bytes(series::tests::slice("2.25.4", 0)).unwrap(),

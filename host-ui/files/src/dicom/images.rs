@@ -1,5 +1,7 @@
 //! The grid of the image series under a structure set.
 
+mod sparse;
+
 use super::super::element::voxel_count;
 use super::super::frame::VoxelFrame;
 use super::super::{Progress, bytes};
@@ -11,6 +13,8 @@ use dicom_dictionary_std::tags;
 use nalgebra::{Matrix3, Vector3};
 use std::path::{Path, PathBuf};
 use stylet_anatomy::ras_from_lps;
+
+pub(super) use sparse::sparse;
 
 /// Most files of a series; a usual one has some hundreds.
 const MAX_FILES: usize = 4096;

@@ -8,6 +8,7 @@ use super::super::progress::Stage;
 use super::super::volume::VoxelValues;
 use super::images::{self, Slice};
 use super::pixels::{self, Groups, Pixel};
+use super::segmentation::is_segmentation;
 use super::values::{items, name, number, text};
 use super::{Identity, Object, checked};
 use crate::error::{ContentError, FileError, invalid};
@@ -211,9 +212,9 @@ fn modality_of(object: &Object) -> Result<String, ContentError> {
     text(&object.data, tags::MODALITY).ok_or_else(missing)
 }
 
-/// Returns whether the pixels of an object are a dose, not images of a series.
+/// Returns whether the pixels of an object are a dose or structures of a series, not its images.
 fn is_of_images(object: &Object) -> bool {
-    object.sop_class == super::RT_DOSE
+    object.sop_class == super::RT_DOSE || is_segmentation(&object.sop_class)
 }
 
 fn is_enhanced(object: &Object) -> bool {

@@ -105,7 +105,7 @@ impl StructureSet {
     pub fn of(object: &Object) -> Result<Self, ContentError> {
         if object.sop_class != uids::RT_STRUCTURE_SET_STORAGE {
             return Err(invalid!(
-                "it is DICOM of another kind (SOP class {}); a segmentation is an RT Structure Set",
+                "it is DICOM of another kind (SOP class {}); structures are in an RT Structure Set or a Segmentation",
                 short(&object.sop_class)
             ));
         }

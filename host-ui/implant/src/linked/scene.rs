@@ -14,10 +14,11 @@ use stylet_dose::decay::Interval;
 use stylet_dose::report::Judge;
 use stylet_dose::{DoseGrid, DoseKernel, Dvh, Seed, Source, structure};
 use stylet_files::dicom::images::{self, Slice};
+use stylet_files::dicom::segmentation::is_segmentation;
 use stylet_files::dicom::structures::StructureSet;
 use stylet_files::dicom::structures::write::{Outlined, of_set, of_voxels};
 use stylet_files::dicom::{self, Identity};
-use stylet_files::{ContentError, FileError, Progress, VoxelFrame, Voxels, bytes, scene as scene_file};
+use stylet_files::{ContentError, FileError, Progress, VoxelFrame, Voxels, bytes, read_voxels, scene as scene_file};
 use stylet_host::link::SceneModel;
 
 /// Pitch of the points of the histograms, as in every evaluation of a plan, and side of a voxel of
@@ -166,8 +167,8 @@ struct Drawn {
     notes: Vec<String>,
 }
 
-/// Reads the contours of a structure set, or of the one that a scene file names; `None` for any
-/// other file.
+/// Reads the contours of a structure set or outlines of a segmentation, or of those that a scene
+/// file names; `None` for any other file.
 fn of_file(path: &Path) -> Result<Option<Drawn>, SceneStudyError> {
     let named = match scene_file::is_scene(path) {
         true => Some(path.with_file_name(scene_file::read(path)?.volume)),
@@ -180,6 +181,15 @@ fn of_file(path: &Path) -> Result<Option<Drawn>, SceneStudyError> {
         return Ok(None);
     }
     let object = dicom::read(&content).map_err(refused)?;
+    if is_segmentation(&object.sop_class) {
+        let voxels = read_voxels(path, &Progress::default())?;
+        return Ok(Some(Drawn {
+            structures: of_voxels(&voxels)?,
+            identity: Identity::of(&object).completed(),
+            images: Vec::new(),
+            notes: voxels.frame.warning.into_iter().collect(),
+        }));
+    }
     let set = StructureSet::of(&object).map_err(refused)?;
     let identity = Identity::of(&object);
     let found = images::find(bytes::folder(path), &set.series, &set.images, &identity);

@@ -25,16 +25,14 @@ impl Region for Drawing<'_> {
 type Drawn = (Vec<Structure>, Vec<String>);
 
 /// Returns the structures of an RT Structure Set, each of at most `most_points` points; `None` for
-/// a file that is not DICOM.
+/// a file that holds labels.
 pub fn structures(path: &Path, most_points: usize) -> Result<Option<Drawn>, FileError> {
     let refused = |why| FileError::of(path, why);
     let bytes = watched(path, |progress| bytes::whole(path, progress)).map_err(refused)?;
-    if !dicom::is_dicom(&bytes) {
+    let Some(object) = dicom::drawn(&bytes).map_err(refused)? else {
         return Ok(None);
-    }
-    let set = dicom::read(&bytes)
-        .and_then(|o| StructureSet::of(&o))
-        .map_err(refused)?;
+    };
+    let set = StructureSet::of(&object).map_err(refused)?;
     let solids = set.solids().map_err(refused)?;
     let structures = solids.iter().map(|s| of_solid(s, most_points)).collect::<Vec<_>>();
     Ok(Some((

@@ -1,6 +1,7 @@
 //! Series whose values encode the places of their voxels, against the geometry that they were
 //! written with.
 
+use super::super::segmentation;
 use super::super::write::{bytes as file_bytes, common, decimals, item, sequence, string};
 use super::*;
 use dicom_core::value::PrimitiveValue;
@@ -140,6 +141,16 @@ fn a_series_has_its_place_and_rescaled_values() {
         why.contains("2 series") && why.contains("2.25.11") && why.contains("2.25.12"),
         "{why}"
     );
+}
+
+#[test]
+fn a_segmentation_beside_a_series_is_no_series() {
+    let folder = tempfile::tempdir().unwrap();
+    write_series(folder.path(), "2.25.11", &[0, 1, 2, 3]);
+    let structures = segmentation::write::bytes(&segmentation::tests::volume(false), &Identity::new()).unwrap();
+    std::fs::write(folder.path().join("1.dcm"), structures).unwrap();
+    check(&read(folder.path(), &Progress::default()).unwrap());
+    assert_eq!(modality(folder.path()).unwrap().unwrap().0, "CT");
 }
 
 /// Rounded positions used to be refused with the words for a missing slice.
