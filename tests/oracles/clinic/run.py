@@ -1,6 +1,6 @@
-"""Compares what Stylet reads with what other programs read, on 200 generated objects and 4 studies that it writes; fails above the bars.
+"""Compares what Stylet reads with what other programs read, on 266 generated objects and 4 studies that it writes; fails above the bars.
 
-    python run.py HOST-UI FOLDER [KIND ...]     KIND: images, structures, doses, plans, labels, histograms
+    python run.py HOST-UI FOLDER [KIND ...]     KIND: images, structures, doses, plans, labels, histograms, segmentations, compressed
 """
 import importlib
 import pathlib
@@ -12,7 +12,7 @@ import numpy as np
 from common import Stylet
 
 SEED = 45
-KINDS = ["images", "structures", "doses", "plans", "labels", "histograms"]
+KINDS = ["images", "structures", "doses", "plans", "labels", "histograms", "segmentations", "compressed"]
 
 
 def main():
