@@ -5,6 +5,8 @@ mod dvh;
 #[cfg(test)]
 mod grid;
 #[cfg(test)]
+mod registration;
+#[cfg(test)]
 mod source;
 #[cfg(test)]
 mod sources;
