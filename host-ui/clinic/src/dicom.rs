@@ -91,7 +91,7 @@ impl DicomArgs {
         }
         let target = number(judge.target_name());
         let mut inputs: Vec<(&str, &Path)> = vec![
-            ("--source", &c.source),
+            ("--source", c.source()?),
             ("--seeds", &self.seeds),
             ("--structures", &self.structures),
         ];

@@ -10,6 +10,7 @@ use stylet_base::progress_bar::LongTask;
 use stylet_base::write_whole;
 use stylet_dose::kernel::DoseKernel;
 use stylet_dose::picture::Curve;
+use stylet_dose::report::{Judge, Verdict};
 use stylet_dose::seed::Seed;
 use stylet_dose::{DoseGrid, DosePoints, picture, structure};
 use stylet_files::dicom::Shared;
@@ -17,7 +18,10 @@ use stylet_files::together;
 use stylet_implant::provenance;
 use stylet_implant::readers::read_points;
 
+pub use imported::Checked;
+
 pub mod common;
+mod imported;
 pub mod write;
 
 pub const POINTS_FOR_DOSE: usize = 300_000;
@@ -37,29 +41,38 @@ A plan declares the isotope of its seeds, their strength on a given day, and the
 source are refused, strengths decay to --implant-date, and the plan's prescription applies unless --prescription-gy is given.
 A seed with an axis gets the 2D formalism, a seed without one the 1D formalism (averaged over directions).
 
+With --rt-dose the figures are those of an imported dose: RT Dose, NRRD, NIfTI-1 or MetaImage in Gy, or dose_grid.csv. It is interpolated
+at the points of each structure (cubics). The part of a structure outside of its voxels is reported and not counted; a target of which
+1 % is outside is refused. With --seeds in addition, each measure of the TG-43U1 dose stands beside it: a second check.
+
 Examples:
   host-ui dose --source sources/i125_6711.toml --seeds seeds.csv --strength-u 0.5 --points points.csv --out dose
   host-ui dose --source sources/i125_6711.toml --seeds seeds.csv --structures gland.nii.gz \\
       --name 1=Prostate --name 2=Urethra --name 3=Rectum --metric D5 --metric V145Gy --out dose
   host-ui dose --source sources/pd103_200.toml --seeds seeds.csv --from-days 0 --to-days 30 --spacing-mm 2 --out dose
+  host-ui dose --rt-dose rtdose.dcm --structures rtstruct.dcm --seeds rtplan.dcm --source sources/i125_6711.toml --out check
 
 Written to --out, a new or empty folder: dose_points.csv; dvh.csv, dvh.svg, metrics.json and report.html (one page by TG-137, A4);
-dose_grid.csv when neither points nor structures are given; made.json, which names every input with its SHA-256, the version and the time.";
+dose_grid.csv when neither points nor structures are given; second_check.csv for an imported dose of seeds, whose dvh.svg has the TG-43U1
+dose dashed; made.json, which names every input with its SHA-256, the version and the time.";
 
 #[derive(Args, Debug)]
-#[command(after_long_help = DOSE_HELP)]
+#[command(after_long_help = DOSE_HELP, mut_arg("source", |arg| arg.required(false).required_unless_present("rt_dose")))]
 pub struct DoseArgs {
     #[command(flatten)]
     common: Common,
     /// Seeds: CSV, a plan of host-ui (.toml), or a DICOM RT Plan; see --help
-    #[arg(long, value_name = "FILE")]
-    seeds: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "rt_dose", requires = "source")]
+    seeds: Option<PathBuf>,
     /// Points for the dose (CSV: x_mm,y_mm,z_mm)
     #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
     /// Structures: NIfTI-1, NRRD, MetaImage, DICOM RT Structure Set or Segmentation
     #[arg(long, value_name = "FILE")]
     structures: Option<PathBuf>,
+    /// Imported dose to evaluate in the structures: an RT Dose, or a volume in Gy
+    #[arg(long, value_name = "FILE", requires = "structures")]
+    rt_dose: Option<PathBuf>,
     /// Side of the voxels of the grid
     #[arg(long, value_name = "MM", default_value_t = 1.0)]
     spacing_mm: f64,
@@ -74,12 +87,17 @@ impl DoseArgs {
         within("--spacing-mm", self.spacing_mm, 0.05, 100.0)?;
         within("--bin-gy", self.bin_gy, 1e-3, 1e4)?;
         let clinical = [
-            Some(self.seeds.as_path()),
+            self.rt_dose.as_deref(),
+            self.seeds.as_deref(),
             self.points.as_deref(),
             self.structures.as_deref(),
         ];
         let identity = together(&clinical, Shared::Frame)?;
-        let loaded = c.load(&self.seeds)?;
+        if let Some(file) = &self.rt_dose {
+            return self.run_imported(file, identity.as_ref());
+        }
+        let seeds_file = self.seeds.as_deref().ok_or("give the seeds with --seeds FILE")?;
+        let loaded = c.load(seeds_file)?;
         let (source, kernel, seeds) = (&loaded.source, &loaded.kernel, &loaded.seeds);
         let points = self.points.as_deref().map(read_points).transpose()?;
         let structures = self
@@ -100,7 +118,7 @@ impl DoseArgs {
             let verdict = judge.judge_reporting(kernel, seeds, &|done| task.advance(done));
             (judge, verdict)
         });
-        let mut inputs: Vec<(&str, &Path)> = vec![("--source", &c.source), ("--seeds", &self.seeds)];
+        let mut inputs: Vec<(&str, &Path)> = vec![("--source", c.source()?), ("--seeds", seeds_file)];
         inputs.extend(self.points.as_deref().map(|file| ("--points", file)));
         inputs.extend(self.structures.as_deref().map(|file| ("--structures", file)));
         let made = provenance::made(&inputs)?;
@@ -116,16 +134,7 @@ impl DoseArgs {
             )?;
         }
         if let Some((judge, verdict)) = &judged {
-            let prescription_gy = c.prescription_gy(&loaded)?;
-            let curves: Vec<_> = judge.names().zip(&verdict.dvhs).collect();
-            write::dvh(&c.out.join("dvh.csv"), &curves, prescription_gy, self.bin_gy)?;
-            let structures = curves.iter().map(|&(name, dvh)| Curve {
-                name,
-                dvh,
-                planned: None,
-            });
-            let drawn = picture::dvh((900, 560), &structures.collect::<Vec<_>>(), prescription_gy)?;
-            write_whole(&c.out.join("dvh.svg"), drawn.as_bytes())?;
+            self.write_histograms(judge, (verdict, None), c.prescription_gy(&loaded)?)?;
             let mut metrics = judge.to_json(verdict);
             metrics["dose"] = c.provenance(source, seeds);
             metrics["made"] = made.clone();
@@ -133,10 +142,10 @@ impl DoseArgs {
             print!("{}", stylet_base::format::printable_table(&judge.table(verdict)));
         }
         if let Some((structures, target)) = structures {
-            let implant = self.implant(&loaded)?;
+            let implant = self.implant(seeds_file, &loaded)?;
             let state = State {
                 name: "dose".to_owned(),
-                file: file_name(&self.seeds),
+                file: file_name(seeds_file),
                 structures_are: self.structures.as_deref().map(file_name).unwrap_or_default(),
                 seen_s: 0.0,
                 seeds: seeds.clone(),
@@ -160,9 +169,29 @@ impl DoseArgs {
 }
 
 impl DoseArgs {
-    fn implant(&self, loaded: &Loaded) -> Result<Implant, CommandError> {
+    /// Writes the histograms of a dose, and draws those of another one dashed.
+    fn write_histograms(
+        &self,
+        judge: &Judge,
+        (dose, dashed): (&Verdict, Option<&Verdict>),
+        prescription_gy: f64,
+    ) -> Result<(), CommandError> {
+        let out = &self.common.out;
+        let curves: Vec<_> = judge.names().zip(&dose.dvhs).collect();
+        write::dvh(&out.join("dvh.csv"), &curves, prescription_gy, self.bin_gy)?;
+        let all = curves.iter().enumerate().map(|(n, &(name, dvh))| Curve {
+            name,
+            dvh,
+            planned: dashed.and_then(|dashed| dashed.dvhs.get(n)),
+        });
+        let curves: Vec<Curve> = all.collect();
+        let drawn = picture::dvh((900, 560), &curves, prescription_gy)?;
+        Ok(write_whole(&out.join("dvh.svg"), drawn.as_bytes())?)
+    }
+
+    fn implant(&self, seeds: &Path, loaded: &Loaded) -> Result<Implant, CommandError> {
         Ok(Implant {
-            title: file_name(&self.seeds),
+            title: file_name(seeds),
             source: loaded.source.clone(),
             prescription_gy: self.common.prescription_gy(loaded)?,
             calibrated: self.common.calibrated(loaded),

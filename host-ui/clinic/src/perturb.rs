@@ -166,7 +166,7 @@ impl PerturbArgs {
         result["trials"] = json!(trials.len());
         result["trials_asked"] = json!(self.trials);
         let mut inputs: Vec<(&str, &Path)> = vec![
-            ("--source", &c.source),
+            ("--source", c.source()?),
             ("--plan", &self.plan),
             ("--structures", &self.structures),
         ];

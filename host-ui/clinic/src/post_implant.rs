@@ -208,7 +208,7 @@ impl PostImplantArgs {
     fn write(&self, implant: &Implant, columns: &[Column]) -> Result<(), CommandError> {
         let out = &self.common.out;
         let mut inputs: Vec<(&str, &Path)> = vec![
-            ("--source", &self.common.source),
+            ("--source", self.common.source()?),
             ("--planned", &self.planned),
             ("--structures", &self.structures),
         ];

@@ -42,6 +42,20 @@ impl DoseGrid {
         }
     }
 
+    /// Creates a grid with a dose from elsewhere, x fastest; returns an error as [`DoseGrid::new`],
+    /// and for another number of voxels.
+    pub fn of(origin_m: [f64; 3], spacing_m: [f64; 3], dims: [usize; 3], dose_gy: Vec<f64>) -> Result<Self, DoseError> {
+        let empty = Self::new(origin_m, spacing_m, dims)?;
+        if dose_gy.len() != empty.dose_gy.len() {
+            return Err(DoseError::Grid(format!(
+                "{} doses for {} voxels",
+                dose_gy.len(),
+                empty.dose_gy.len()
+            )));
+        }
+        Ok(Self { dose_gy, ..empty })
+    }
+
     /// Creates a grid of cubes that covers a box.
     pub fn covering(low_m: [f64; 3], high_m: [f64; 3], spacing_m: f64) -> Result<Self, DoseError> {
         let dims = [0, 1, 2].map(|a| ((high_m[a] - low_m[a]) / spacing_m - 1e-9).ceil().max(0.0) as usize + 1);
@@ -81,6 +95,15 @@ impl DoseGrid {
     pub fn centre_m(&self, [i, j, k]: [usize; 3]) -> [f64; 3] {
         let at = [i as f64, j as f64, k as f64];
         [0, 1, 2].map(|a| self.origin_m[a] + at[a] * self.spacing_m[a])
+    }
+
+    /// Returns whether a place lies in a voxel.
+    pub fn has(&self, point_m: [f64; 3]) -> bool {
+        (0..3).all(|a| {
+            let at = (point_m[a] - self.origin_m[a]) / self.spacing_m[a];
+            // A part in a million of a voxel is rounding.
+            (-0.500_001..=self.dims[a] as f64 - 0.499_999).contains(&at)
+        })
     }
 
     /// Adds the dose of seeds.

@@ -1,5 +1,6 @@
 //! Dose at arbitrary points.
 
+use super::grid::DoseGrid;
 use super::kernel::{BLOCK, Block, DoseKernel, Placed};
 use super::seed::Seed;
 use rayon::prelude::*;
@@ -99,6 +100,15 @@ impl DosePoints {
         };
         let seeds: Vec<Seed> = seeds.iter().map(moved).collect();
         stretched.of_seeds_gy(kernel, &seeds)
+    }
+
+    /// Interpolates the dose of a grid at the points, in Gy.
+    pub fn of_grid_gy(&self, grid: &DoseGrid) -> Vec<f64> {
+        let at = |n: usize| {
+            let axes = &self.blocks[n / BLOCK];
+            grid.at_gy([0, 1, 2].map(|a| self.anchor_m[a] + f64::from(axes[a][n % BLOCK])))
+        };
+        (0..self.dose_gy.len()).into_par_iter().map(at).collect()
     }
 
     fn place(&self, seeds: &[Seed]) -> Vec<Placed> {

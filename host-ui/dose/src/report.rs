@@ -4,6 +4,7 @@ use super::Dvh;
 use super::criterion::Criterion;
 use super::edema::Swelling;
 use super::error::DoseError;
+use super::grid::DoseGrid;
 use super::kernel::DoseKernel;
 use super::metric::{Metric, Value};
 use super::points::DosePoints;
@@ -117,6 +118,11 @@ impl Judge {
     /// Like [`Judge::judge`]; calls `done` with the number of points done since, from any thread.
     pub fn judge_reporting(&self, kernel: &DoseKernel, seeds: &[Seed], done: &(dyn Fn(u64) + Sync)) -> Verdict {
         self.judge_by(&|points| points.of_seeds_reporting(kernel, seeds, done))
+    }
+
+    /// Evaluates the dose of a grid; beyond it the dose of the nearest voxel counts.
+    pub fn judge_grid(&self, grid: &DoseGrid) -> Verdict {
+        self.judge_by(&|points| points.of_grid_gy(grid))
     }
 
     fn judge_by(&self, dose_gy: &dyn Fn(&DosePoints) -> Vec<f64>) -> Verdict {

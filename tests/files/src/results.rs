@@ -112,3 +112,77 @@ fn names_of_structures_reach_the_terminal_without_control_characters() {
         assert!(String::from_utf8_lossy(&said).contains("Prostate[31m"), "{task:?}");
     }
 }
+
+fn host_ui(words: &[&Path]) -> String {
+    let ended = Command::new(program("host-ui"))
+        .args(words)
+        .output()
+        .expect("host-ui runs");
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(ended.status.success(), "{said}");
+    said
+}
+
+/// Doses of other programs used to be compared voxel by voxel alone, without the figures that a clinic decides by.
+#[test]
+fn an_imported_dose_has_the_figures_of_its_seeds() {
+    let folder = scratch("results-imported");
+    let file = |name: &str| folder.join(name);
+    let table = "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u\n-1,4,36,0,0,1,0.5\n5,4,41,0,0,1,0.5\n-6,8,38,0,0,1,0.45\n2,-2,39,,,,0.45\n";
+    std::fs::write(file("seeds.csv"), table).expect("written");
+    let (source, drawn) = (source(), repository("tests/files/data/dicom/structures.dcm"));
+    let [study, check, alone] = ["study", "check", "alone"].map(file);
+    let word = Path::new;
+    let of_seeds = [word("--source"), &source, word("--out")];
+    let seeds = file("seeds.csv");
+    let dicom = [word("dicom"), word("--seeds"), &seeds, word("--structures"), &drawn];
+    host_ui(&[&dicom, of_seeds.as_slice(), &[&study]].concat());
+    let [set, plan, dose] = ["structure_set.dcm", "plan.dcm", "dose.dcm"].map(|name| study.join(name));
+    let evaluated = [word("dose"), word("--structures"), &set, word("--rt-dose")];
+    let said = host_ui(
+        &[
+            &evaluated,
+            [&dose, word("--seeds"), &plan].as_slice(),
+            &of_seeds,
+            &[&check],
+        ]
+        .concat(),
+    );
+    assert!(!said.contains("names another file"), "{said}");
+    let text = std::fs::read_to_string(check.join("second_check.csv")).expect("written");
+    let mut measures = 0;
+    for line in text.lines().skip(1) {
+        let fields: Vec<&str> = line.split(',').collect();
+        let [own, imported] = [1, 2].map(|n| fields[n].parse::<f64>().unwrap_or(f64::NAN));
+        let bar = if fields[0].ends_with("[gy]") { 0.005 * own } else { 0.3 };
+        let units = ["[gy]", "[percent]"];
+        let is_measure = units.iter().any(|unit| fields[0].ends_with(unit)) && !fields[1].is_empty();
+        assert!(!is_measure || (own - imported).abs() <= bar, "{line}");
+        measures += usize::from(is_measure);
+    }
+    assert!(measures >= 6, "{text}");
+    // The same dose in another format, without the seeds.
+    let volume = file("dose.nrrd");
+    host_ui(&[word("convert"), &dose, &volume]);
+    let more = [word("--prescription-gy"), word("145"), word("--out"), &alone];
+    host_ui(&[&evaluated, [volume.as_path()].as_slice(), &more].concat());
+    let figures = |folder: &Path| -> serde_json::Value {
+        serde_json::from_str(&std::fs::read_to_string(folder.join("metrics.json")).expect("written")).expect("JSON")
+    };
+    let (check, alone) = (figures(&check), figures(&alone));
+    assert_eq!(check["structures"], alone["structures"]);
+    assert!(check["second_check"]["left_out"].is_string() && alone["second_check"].is_null());
+    // Another structure set than the one that the dose names.
+    let said = host_ui(&[
+        word("dose"),
+        word("--structures"),
+        &drawn,
+        word("--rt-dose"),
+        &dose,
+        word("--prescription-gy"),
+        word("145"),
+        word("--out"),
+        &file("other"),
+    ]);
+    assert!(said.contains("names another file than"), "{said}");
+}

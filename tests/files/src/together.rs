@@ -29,7 +29,7 @@ enum Kind {
 }
 
 /// Options for clinical files, by command; `convert` gets a dose.
-const CLINICAL: [(&str, &str, Kind); 27] = [
+const CLINICAL: [(&str, &str, Kind); 28] = [
     ("", "scene", Kind::Structures),
     ("", "image", Kind::Images),
     ("procedure", "scene", Kind::Structures),
@@ -44,6 +44,7 @@ const CLINICAL: [(&str, &str, Kind); 27] = [
     ("dicom", "images", Kind::Images),
     ("dicom", "like", Kind::Dose),
     ("dose", "seeds", Kind::Seeds),
+    ("dose", "rt_dose", Kind::Dose),
     ("dose", "points", Kind::Points),
     ("dose", "structures", Kind::Structures),
     ("perturb", "plan", Kind::Seeds),

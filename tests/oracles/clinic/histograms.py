@@ -56,17 +56,38 @@ def histograms(found, stylet, rng, folder, out, drawn, source, planned):
     named = [word for percent in PERCENTS for word in ("--metric", f"D{percent}")]
     if stylet.read(found, "dose", "--source", source, "--seeds", folder / "seeds.csv", "--structures", folder / "structures.dcm", *named, "--out", metrics) is None:
         return
-    told = {s["name"]: s for s in json.loads((metrics / "metrics.json").read_text())["structures"]}
+    told = figures(metrics)
+    imported = folder / "imported"
+    given = ["--rt-dose", dose_path, "--structures", set_path, "--prescription-gy", 145]
+    if stylet.read(found, "dose", *given, *named, "--metric", "Dmean", "--out", imported) is None:
+        return
+    of_import = figures(imported)
     written = dicomparser.DicomParser(str(dose_path)).GetDVHs()
     for number, roi in dicomparser.DicomParser(str(set_path)).GetStructures().items():
         polygons = drawn[roi["name"]]
         found.compare("written histogram: share of the volume drawn", abs(written[number].volume / structures.volume_cc(polygons) - 1), common.VOLUME)
         theirs = dvhcalc.get_dvh(str(set_path), str(dose_path), number)
         mine = plans.dose(inside(rng, polygons) @ common.RAS, planned, tomllib.loads(source.read_text()), 1.0)
+        compare_imported(found, theirs, of_import[roi["name"]])
         for percent in PERCENTS:
             gy = told[roi["name"]]["metrics"][f"D{percent}"]["gy"]
+            imported_gy = of_import[roi["name"]]["metrics"][f"D{percent}"]["gy"]
+            found.compare("imported, D90, D50, D10 beside TG-43U1: share", abs(imported_gy / gy - 1), 0.005)
             found.compare("D90, D50, D10 by random points: share", abs(np.percentile(mine, 100 - percent) / gy - 1), 0.01)
             found.compare("D90, D50, D10 by dicompyler: share", abs(theirs.statistic(f"D{percent}").value / gy - 1), 0.02)
+
+
+def figures(folder):
+    return {s["name"]: s for s in json.loads((folder / "metrics.json").read_text())["structures"]}
+
+
+def compare_imported(found, theirs, ours):
+    """`dose --rt-dose` beside dicompyler-core, which counts pixels of the dose in each plane of contours."""
+    found.compare("imported, volume beside dicompyler: share", abs(ours["volume_cc"] / theirs.volume - 1), 0.02)
+    for percent in PERCENTS:
+        gy = ours["metrics"][f"D{percent}"]["gy"]
+        found.compare("imported, D90, D50, D10 beside dicompyler: share", abs(theirs.statistic(f"D{percent}").value / gy - 1), 0.02)
+    found.compare("imported, mean beside dicompyler: share", abs(theirs.mean / ours["metrics"]["Dmean"]["gy"] - 1), 0.02)
 
 
 def inside(rng, polygons):

@@ -23,8 +23,8 @@ use stylet_population as population;
 #[derive(Args, Debug)]
 pub struct Common {
     /// Source file (TOML), or the model of a source that 'host-ui sources' lists
-    #[arg(long, value_name = "FILE")]
-    pub source: PathBuf,
+    #[arg(long, value_name = "FILE", required = true)]
+    source: Option<PathBuf>,
     /// Strength in U of seeds whose file gives none
     #[arg(long, value_name = "U")]
     strength_u: Option<f64>,
@@ -81,6 +81,14 @@ pub struct Loaded {
 }
 
 impl Common {
+    /// Returns the file of the source.
+    pub fn source(&self) -> Result<&Path, CommandError> {
+        Ok(self
+            .source
+            .as_deref()
+            .ok_or("give the source of the seeds with --source FILE")?)
+    }
+
     /// Loads source, dose of a seed of 1 U over the requested time, and seeds with their strength
     /// at the implant.
     pub fn load(&self, path: &Path) -> Result<Loaded, CommandError> {
@@ -92,12 +100,13 @@ impl Common {
         if let Some(u) = self.strength_u {
             within("--strength-u", u, 0.0, 1e5)?;
         }
-        let source = read_source(&self.source)?;
+        let source_file = self.source()?;
+        let source = read_source(source_file)?;
         let is_taken_out = Nuclide::parse(&source.nuclide).is_some_and(|n| !n.is_of_permanent_seeds());
         if is_taken_out && self.to_days.is_none() {
             return Err(format!(
                 "{} is {}, whose sources are taken out again; give the time that they stay with --to-days",
-                self.source.display(),
+                source_file.display(),
                 source.nuclide
             )
             .into());
@@ -118,14 +127,14 @@ impl Common {
         if source.tables.anisotropy_2d.is_none() && all.iter().any(|s| s.axis.is_some()) {
             return Err(format!(
                 "{} has no [anisotropy_2d], which seeds with an axis need; leave the axis columns out",
-                self.source.display()
+                source_file.display()
             )
             .into());
         }
         if source.tables.anisotropy_1d.is_none() && all.iter().any(|s| s.axis.is_none()) {
             return Err(format!(
                 "{} has no [anisotropy_1d], which seeds without an axis need; give every seed its axis",
-                self.source.display()
+                source_file.display()
             )
             .into());
         }
@@ -151,13 +160,17 @@ impl Common {
         })
     }
 
-    pub fn prescription_gy(&self, loaded: &Loaded) -> Result<f64, CommandError> {
-        let gy = loaded.prescription_gy.ok_or_else(|| {
-            format!(
-                "{} names no prescription_gy; give --prescription-gy",
-                self.source.display()
-            )
-        })?;
+    /// Returns the prescription: of the option, the plan or the source.
+    pub fn prescription_gy<'a>(&self, loaded: impl Into<Option<&'a Loaded>>) -> Result<f64, CommandError> {
+        let gy = match (loaded.into(), &self.source) {
+            (Some(loaded), Some(source)) => loaded.prescription_gy.ok_or_else(|| {
+                let file = source.display();
+                format!("{file} names no prescription_gy; give --prescription-gy")
+            })?,
+            _ => self
+                .prescription_gy
+                .ok_or("give the prescribed dose with --prescription-gy")?,
+        };
         within("--prescription-gy", gy, 1e-3, 1e4)?;
         Ok(gy)
     }
@@ -191,7 +204,8 @@ impl Common {
         )?)
     }
 
-    fn extra_metrics(&self) -> Result<Vec<Metric>, CommandError> {
+    /// Returns the requested metrics.
+    pub fn extra_metrics(&self) -> Result<Vec<Metric>, CommandError> {
         let metrics = self.metrics.iter().map(|m| Metric::parse(m));
         Ok(metrics.collect::<Result<Vec<_>, _>>()?)
     }

@@ -1,5 +1,6 @@
 //! Results as CSV, JSON and tables; the header of each column gives its unit.
 
+use super::Checked;
 use crate::CommandError;
 use crate::finder::FoundSeed;
 use crate::sheet::{NotComputed, Row};
@@ -121,6 +122,43 @@ pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64, bin_gy: f
         })
     });
     csv(path, &header, rows)
+}
+
+/// Writes the measures of an imported dose beside those of the TG-43U1 dose; an empty field is undefined.
+pub fn second_check(path: &Path, measures: &[Checked]) -> Result<(), CommandError> {
+    let header = owned(&["measure [unit]", "tg43", "imported", "difference", "difference_percent"]);
+    let rows = measures.iter().map(|m| {
+        let values = [m.own, m.imported, m.difference(), m.percent()];
+        let values = values.map(|v| v.map_or_else(String::new, |v| format!("{v:.6}")));
+        [vec![m.name.clone()], values.to_vec()].concat()
+    });
+    csv(path, &header, rows)
+}
+
+pub fn checked_json(measures: &[Checked]) -> Value {
+    let of = |m: &Checked| {
+        json!({
+            "measure": m.name, "tg43": m.own, "imported": m.imported, "difference": m.difference(), "difference_percent": m.percent(),
+        })
+    };
+    measures.iter().map(of).collect()
+}
+
+pub fn checked_table(model: &str, measures: &[Checked]) -> String {
+    let mut text = format!(
+        "{:32} {:>10} {:>10} {:>10} {:>8}",
+        "second check", "imported", "TG-43U1", "difference", "%"
+    );
+    for m in measures {
+        let figure = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+        let percent = m.percent().map_or_else(|| "-".to_owned(), |v| format!("{v:.2}"));
+        let (name, imported, own) = (&m.name, figure(m.imported), figure(m.own));
+        text += &format!(
+            "\n{name:32} {imported:>10} {own:>10} {:>10} {percent:>8}",
+            figure(m.difference())
+        );
+    }
+    text + &format!("\nof seeds of {model}; percents are those of TG-43U1\n")
 }
 
 /// Writes the figures of several states, one line each; a field without a figure gives the reason.

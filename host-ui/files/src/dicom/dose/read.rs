@@ -9,6 +9,7 @@ use super::DoseKind;
 use crate::VoxelValues;
 use crate::error::{ContentError, FileError, invalid};
 use crate::progress::Progress;
+use dicom_core::Tag;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
 use nalgebra::Vector3;
@@ -83,6 +84,33 @@ pub(in crate::dicom) fn of(object: &Object, pixels: &[u8], endian: Endian) -> Re
         structure_set: first(tags::REFERENCED_STRUCTURE_SET_SEQUENCE),
         ..grid.dose(&values, kind, notes)
     })
+}
+
+impl ReadDose {
+    /// Returns a remark for each reference to another plan or structure set than these files.
+    pub fn other_references(&self, plan: Option<&Path>, structure_set: Option<&Path>) -> Vec<String> {
+        let named = [
+            (tags::REFERENCED_RT_PLAN_SEQUENCE, &self.plan, plan),
+            (
+                tags::REFERENCED_STRUCTURE_SET_SEQUENCE,
+                &self.structure_set,
+                structure_set,
+            ),
+        ];
+        let other = |(tag, uid, file): (Tag, &Option<String>, Option<&Path>)| {
+            let (uid, file) = (uid.as_ref()?, file?);
+            let found = instance_of(file)?;
+            (found != *uid).then(|| format!("{} names another file than {}", name(tag), file.display()))
+        };
+        named.into_iter().filter_map(other).collect()
+    }
+}
+
+/// Returns the SOP instance UID of a DICOM file; `None` for any other one.
+fn instance_of(path: &Path) -> Option<String> {
+    let content = crate::bytes::whole(path, &Progress::default()).ok()?;
+    let object = checked::is_dicom(&content).then(|| checked::read_head(&content).ok())??;
+    text(&object.data, tags::SOP_INSTANCE_UID)
 }
 
 /// Takes a volume of another format as a dose in gray.
