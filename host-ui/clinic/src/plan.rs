@@ -17,6 +17,7 @@ use stylet_files::dicom::plan::Date;
 use stylet_files::dicom::{Identity, Shared};
 use stylet_files::together;
 use stylet_host::core_args::CoreArgs;
+use stylet_implant::plan::exchange::beside_scene;
 use stylet_implant::plan::first::{self, FirstPlan};
 use stylet_implant::plan::optimise::{Objectives, Statistic};
 use stylet_implant::plan::{Anatomy, ImplantPlan, Template, check};
@@ -137,7 +138,10 @@ enum Wanted {
 impl PlanArgs {
     pub fn run(self) -> Result<(), CommandError> {
         let source = read_source(&self.source)?;
-        let identity = together(&[self.asked.file(), self.seeds.as_deref()], Shared::Frame)?;
+        let identity = match &self.seeds {
+            Some(seeds) => beside_scene(self.asked.file(), seeds)?.reported(),
+            None => together(&[self.asked.file()], Shared::Frame)?,
+        };
         let (seeds, prescription_gy) = self.seeds(&source)?;
         let prescription_gy = prescription_gy.filter(|gy| (1e-3..=1e4).contains(gy)).ok_or_else(|| {
             let file = self.source.display();

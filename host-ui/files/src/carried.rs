@@ -18,11 +18,7 @@ const HEAD_BYTES: u64 = 1 << 18;
 ///
 /// Files of two patients, or of two frames of reference if they must share one.
 pub fn together(files: &[Option<&Path>], shared: Shared) -> Result<Option<Identity>, FileError> {
-    let agreed = agreed(files, shared)?;
-    for (path, note) in &agreed.notes {
-        report(path, std::slice::from_ref(note));
-    }
-    Ok(agreed.identity)
+    Ok(agreed(files, shared)?.reported())
 }
 
 /// Like [`together`], with the remarks for the caller.
@@ -32,6 +28,16 @@ pub fn agreed(files: &[Option<&Path>], shared: Shared) -> Result<Agreed, FileErr
         all.extend(Identity::of_path(file)?.map(|identity| (file.to_path_buf(), identity)));
     }
     dicom::agree(&all, shared)
+}
+
+impl Agreed {
+    /// Reports the remarks, and returns the identity.
+    pub fn reported(self) -> Option<Identity> {
+        for (path, note) in &self.notes {
+            report(path, std::slice::from_ref(note));
+        }
+        self.identity
+    }
 }
 
 impl Identity {

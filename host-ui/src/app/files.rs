@@ -7,6 +7,7 @@ use crate::panel::workflow::Progress;
 use std::path::PathBuf;
 use stylet_files::Image;
 use stylet_host::core_args::SceneChoice;
+use stylet_shm_schema::{SceneHeader, SceneId};
 
 /// Files of the scene, from their names to the core.
 #[derive(Default)]
@@ -17,11 +18,34 @@ pub(super) struct SceneFiles {
     pub first_image: Option<PathBuf>,
     pub uploading: Option<(u64, String)>,
     /// File that is being read or sent as the next scene, and file of the present scene if this
-    /// window sent it, each with its scene's name.
-    pub scene_to_come: Option<(PathBuf, String)>,
-    pub scene_file: Option<(PathBuf, String)>,
+    /// window sent it.
+    pub scene_to_come: Option<SentScene>,
+    pub scene_file: Option<SentScene>,
     /// Image to show once the scene of this name is loaded.
     pub image_to_come: Option<(Image, String)>,
+}
+
+/// File that this window reads and sends as a scene.
+#[derive(Clone)]
+pub(super) struct SentScene {
+    pub path: PathBuf,
+    /// Name of the scene, once it is read.
+    pub name: String,
+    /// Scene that the core had when this one was sent.
+    pub after: Option<SceneId>,
+}
+
+impl SentScene {
+    /// Returns whether a scene of the core is this one: of its name, and the next after the one before.
+    ///
+    /// The name alone does not tell: files of two patients are often called alike.
+    pub fn is(&self, scene: &SceneHeader) -> bool {
+        let next = self.after.is_some_and(|after| {
+            let generation = after.generation + 1;
+            scene.id() == SceneId { generation, ..after }
+        });
+        next && scene.name.read() == self.name
+    }
 }
 
 impl App {
@@ -85,5 +109,39 @@ impl App {
             true => Action::Plan(PlanAction::Import(path)),
             false => Action::LoadScene(path),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stylet_shm_schema::Text;
+
+    /// The file of a scene used to be known by its name: after another window had loaded `rs.dcm` of another patient,
+    /// plans and studies were written with the patient and the contours of the own `rs.dcm`.
+    #[test]
+    fn a_scene_of_the_same_name_is_not_the_own_one() {
+        let mut scene = SceneHeader {
+            session_id: 7,
+            generation: 3,
+            name: Text::new("rs.dcm"),
+            ..SceneHeader::default()
+        };
+        let own = SentScene {
+            path: "p1/rs.dcm".into(),
+            name: "rs.dcm".to_owned(),
+            after: Some(SceneId {
+                session_id: 7,
+                generation: 2,
+            }),
+        };
+        assert!(own.is(&scene));
+        scene.generation = 4;
+        assert!(!own.is(&scene), "loaded by another window");
+        (scene.session_id, scene.generation) = (8, 3);
+        assert!(!own.is(&scene), "of another core");
+        (scene.session_id, scene.name) = (7, Text::new("other.dcm"));
+        assert!(!own.is(&scene));
+        assert!(!SentScene { after: None, ..own }.is(&scene));
     }
 }

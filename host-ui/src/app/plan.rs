@@ -98,9 +98,9 @@ impl App {
     /// Returns the file of the present scene, if this window loaded it.
     pub(super) fn scene_file(&self) -> Option<PathBuf> {
         // Another window may have loaded another scene since.
-        let name = self.link.scene()?.header.name.read();
-        let file = self.files.scene_file.as_ref().filter(|(_, of)| *of == name);
-        file.map(|(path, _)| path.clone())
+        let scene = &self.link.scene()?.header;
+        let file = self.files.scene_file.as_ref().filter(|file| file.is(scene));
+        file.map(|file| file.path.clone())
     }
 
     fn next_needle(&mut self) {

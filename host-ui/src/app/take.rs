@@ -3,6 +3,7 @@
 
 use super::App;
 use super::drive::Drive;
+use super::files::SentScene;
 use crate::action::Action;
 use crate::dose_worker::DoseRequest;
 use crate::loader::Loaded;
@@ -199,8 +200,9 @@ impl App {
             Some(Err(why)) => self.shown.load = LoadState::Refused(why.to_string()),
             Some(Ok(Loaded::Scene(volume, image))) => {
                 self.files.image_to_come = image.map(|image| (image, volume.name.clone()));
-                if let Some((_, name)) = &mut self.files.scene_to_come {
-                    name.clone_from(&volume.name);
+                if let Some(file) = &mut self.files.scene_to_come {
+                    file.name.clone_from(&volume.name);
+                    file.after = self.link.scene().map(|scene| scene.header.id());
                 }
                 self.upload(&volume);
             }
@@ -214,7 +216,11 @@ impl App {
     pub(super) fn load(&mut self, path: &Path, image: Option<PathBuf>) {
         if !self.shown.load.is_busy() {
             recent::remember(&mut self.settings.recent, absolute(path), false);
-            self.files.scene_to_come = Some((path.to_owned(), String::new()));
+            self.files.scene_to_come = Some(SentScene {
+                path: path.to_owned(),
+                name: String::new(),
+                after: None,
+            });
             self.loader.begin_scene(path, self.files.label, image);
         }
     }

@@ -59,7 +59,7 @@ pub enum SceneStudyError {
 /// Writes `structure_set.dcm`, `plan.dcm`, `dose.dcm` and `study.json` into a new or empty folder,
 /// and returns the remarks on them. Patient, study, frame of reference, contours and images are
 /// those of `like` if it is a DICOM structure set; otherwise the structures are outlined along the
-/// cells of the scene. `report` gets the completed share; if it breaks, nothing is written.
+/// cells of the scene, and a file such as NRRD may still name the patient. `report` gets the completed share; if it breaks, nothing is written.
 ///
 /// # Errors
 ///
@@ -85,14 +85,14 @@ pub fn write(
             (drawn, notes)
         }
         None => {
-            let structures = of_voxels(&voxels(scene)?)?;
+            let (identity, notes) = identity(like)?;
             let drawn = Drawn {
-                structures,
-                identity: Identity::new(),
+                structures: of_voxels(&voxels(scene)?)?,
+                identity,
                 images: Vec::new(),
                 notes: Vec::new(),
             };
-            (drawn, vec!["patient, study and frame of reference are new".to_owned()])
+            (drawn, notes)
         }
     };
     proceed(0.02)?;
@@ -153,6 +153,17 @@ pub fn write(
     // The files are written; there is nothing left to cancel.
     let _ = report(1.0);
     Ok(notes)
+}
+
+/// Returns the identity of a file that is not DICOM, or a new one with a remark.
+fn identity(like: Option<&Path>) -> Result<(Identity, Vec<String>), FileError> {
+    Ok(match like.map(Identity::of_path).transpose()?.flatten() {
+        Some(identity) => (identity.completed(), Vec::new()),
+        None => (
+            Identity::new(),
+            vec!["patient, study and frame of reference are new".to_owned()],
+        ),
+    })
 }
 
 fn known(plan: &ImplantPlan) -> Result<Source, PlanError> {
@@ -242,4 +253,27 @@ fn grid(seeds: &[Seed], structures: &[Outlined]) -> Result<DoseGrid, SceneStudyE
         }
     }
     Ok(DoseGrid::covering(low, high, PITCH_M)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A study of a scene from NRRD used to be of a new patient, although the file names its own.
+    #[test]
+    fn a_study_keeps_the_patient_of_the_scenes_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("gland.nrrd");
+        let own = Identity {
+            patient_id: "P1".to_owned(),
+            frame_of_reference: "1.2.3.4".to_owned(),
+            ..Identity::default()
+        };
+        std::fs::write(&path, format!("NRRD0005\n{}\n", own.pairs())).unwrap();
+        let (kept, notes) = identity(Some(&path)).unwrap();
+        assert_eq!([&kept.patient_id, &kept.frame_of_reference], ["P1", "1.2.3.4"]);
+        assert!(notes.is_empty());
+        std::fs::write(&path, "NRRD0005\n\n").unwrap();
+        assert_eq!(identity(Some(&path)).unwrap().1.len(), 1);
+    }
 }

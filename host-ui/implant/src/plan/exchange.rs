@@ -6,9 +6,9 @@ use std::path::Path;
 use stylet_anatomy::PatientFrame;
 use stylet_dose::Source;
 use stylet_dose::decay::s_to_days;
-use stylet_files::agreed;
 use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
-use stylet_files::dicom::{Identity, Shared, new_uid};
+use stylet_files::dicom::{Agreed, Identity, Shared, new_uid};
+use stylet_files::{FileError, agreed};
 use stylet_shm_schema::SceneHeader;
 
 /// Model of the source for files that name none.
@@ -28,7 +28,7 @@ pub fn read(
     scene: &SceneHeader,
     scene_file: Option<&Path>,
 ) -> Result<(ImplantPlan, Vec<String>), PlanError> {
-    let together = agreed(&[scene_file, Some(path)], Shared::Frame)?;
+    let together = beside_scene(scene_file, path)?;
     let mut notes: Vec<String> = together.notes.into_iter().map(|(_, note)| note).collect();
     let patient = scene.patient();
     if has_ending(path, "toml") {
@@ -55,6 +55,18 @@ pub fn read(
     let template = Template::before(scene);
     let plan = file::import(path, seeds, &patient, template, &source.model, prescription_gy)?;
     Ok((plan, notes))
+}
+
+/// Compares a plan with the file of the scene. The core does not know of which patient its scene is, so a plan of a
+/// patient beside a scene of an unknown file is reported.
+pub fn beside_scene(scene_file: Option<&Path>, path: &Path) -> Result<Agreed, FileError> {
+    let mut together = agreed(&[scene_file, Some(path)], Shared::Frame)?;
+    if scene_file.is_none() && together.identity.is_some() {
+        let note = "the file of the running scene is not known, so patient and frame of reference are not compared; load it here, \
+                    or give it with --scene";
+        together.notes.push((path.to_owned(), note.to_owned()));
+    }
+    Ok(together)
 }
 
 /// Returns the source that the plan declares, or another one of its nuclide, among those that need
@@ -133,4 +145,37 @@ pub fn seeds_of_source(
 
 fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The core does not know whose scene it runs, so a plan of one patient used to be counted in the gland of another
+    /// without a word, wherever a command was not given the file of the scene.
+    #[test]
+    fn a_plan_is_compared_with_the_scene_or_reported() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, identity: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, format!("{identity}x_mm,y_mm,z_mm\n0,0,0\n")).unwrap();
+            path
+        };
+        let plan = file(
+            "plan.csv",
+            "# dicom_patient_id: P1\n# dicom_frame_of_reference: 1.2.3.4\n",
+        );
+        let other = file("other.csv", "# dicom_patient_id: P2\n");
+        let anonymous = file("anonymous.csv", "");
+        let notes = |scene: Option<&Path>, plan: &Path| beside_scene(scene, plan).map(|agreed| agreed.notes.len());
+        assert!(
+            notes(Some(&other), &plan)
+                .unwrap_err()
+                .to_string()
+                .contains("of patient \"P1\"")
+        );
+        assert_eq!(notes(None, &plan).unwrap(), 1);
+        assert_eq!(notes(Some(&plan), &plan).unwrap(), 0);
+        assert_eq!(notes(None, &anonymous).unwrap(), 0);
+    }
 }
