@@ -63,7 +63,8 @@ pub(super) fn of(object: &Object, pixels: &[u8], endian: Endian) -> Result<Voxel
         of_plane[*plane].push((label, n));
     }
     match stored.of_segments() {
-        true => notes.extend(numbered_otherwise(data, &frames)),
+        true if names.len() > 1 => notes.extend(numbered_otherwise(data, &frames)),
+        true => {}
         false => stored.check_labels(&names)?,
     }
     notes.extend(stored.remark());
@@ -134,32 +135,39 @@ fn segment(frame: &Groups, names: &BTreeMap<u8, String>) -> Result<u8, ContentEr
     }
 }
 
-/// Returns a remark if the index of a frame among the segments is that of another segment's frames.
+/// Returns a remark unless the index of each frame among the segments is that of its segment's other
+/// frames; a number that was changed would be found by nothing else.
 fn numbered_otherwise(data: &InMemDicomObject, frames: &[Groups]) -> Option<String> {
     let nothing = InMemDicomObject::new_empty();
     let pointer = |item: &InMemDicomObject| item.get(tags::DIMENSION_INDEX_POINTER)?.value().to_tag().ok();
     let dimensions = items(data, tags::DIMENSION_INDEX_SEQUENCE);
-    let at = dimensions
+    let Some(at) = dimensions
         .iter()
-        .position(|item| pointer(item) == Some(tags::REFERENCED_SEGMENT_NUMBER))?;
+        .position(|item| pointer(item) == Some(tags::REFERENCED_SEGMENT_NUMBER))
+    else {
+        return Some(format!(
+            "{} has no {}, so the segments of its frames are not compared with their indices",
+            name(tags::DIMENSION_INDEX_SEQUENCE),
+            name(tags::REFERENCED_SEGMENT_NUMBER)
+        ));
+    };
     let number = |frame: &Groups| {
         let index = frame.get(tags::FRAME_CONTENT_SEQUENCE).unwrap_or(&nothing);
         let index = index
-            .get(tags::DIMENSION_INDEX_VALUES)?
-            .to_multi_int::<u32>()
-            .ok()?
-            .get(at)
-            .copied()?;
+            .get(tags::DIMENSION_INDEX_VALUES)
+            .and_then(|values| values.to_multi_int::<u32>().ok());
         let segment = frame.get(tags::SEGMENT_IDENTIFICATION_SEQUENCE).unwrap_or(&nothing);
-        Some((index, text(segment, tags::REFERENCED_SEGMENT_NUMBER)?))
+        (
+            index.and_then(|index| index.get(at).copied()),
+            text(segment, tags::REFERENCED_SEGMENT_NUMBER),
+        )
     };
-    let mut pairs: Vec<(u32, String)> = frames.iter().filter_map(number).collect();
-    pairs.sort();
-    pairs.dedup();
-    let (indices, segments): (BTreeSet<&u32>, BTreeSet<&String>) = pairs.iter().map(|(a, b)| (a, b)).unzip();
-    (indices.len() != pairs.len() || segments.len() != pairs.len()).then(|| {
+    let pairs: BTreeSet<_> = frames.iter().map(number).collect();
+    let (indices, segments): (BTreeSet<_>, BTreeSet<_>) = pairs.iter().cloned().unzip();
+    let is_one_to_one = indices.len() == pairs.len() && segments.len() == pairs.len() && !indices.contains(&None);
+    (!is_one_to_one).then(|| {
         format!(
-            "{} and {} of its frames contradict each other; the latter count",
+            "{} of its frames are missing or contradict {}, which counts",
             name(tags::DIMENSION_INDEX_VALUES),
             name(tags::REFERENCED_SEGMENT_NUMBER)
         )

@@ -352,13 +352,19 @@ fn what_may_be_meant_otherwise_is_noted() {
             }),
         ),
     ];
+    let without = (
+        "DimensionIndexSequence (0020,9222) has no",
+        changed(|data| {
+            data.remove_element(tags::DIMENSION_INDEX_SEQUENCE);
+        }),
+    );
     // Of the urethra, in a plane where the rectum has no frame.
     let other = |data: &mut InMemDicomObject| {
         let segment = tags::SEGMENT_IDENTIFICATION_SEQUENCE;
         in_frame(data, 3, segment, short(tags::REFERENCED_SEGMENT_NUMBER, 3));
     };
     let contradicted = ("DimensionIndexValues (0020,9157)", changed(other));
-    for (part, answer) in noted.into_iter().chain([contradicted]) {
+    for (part, answer) in noted.into_iter().chain([without, contradicted]) {
         let note = answer.expect(part);
         assert!(note.contains(part), "{note} without {part}");
     }
