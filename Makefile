@@ -122,7 +122,7 @@ live-test: build live ## Watch 'host-ui record --live' for LIVE_SECONDS (60) wit
 attributes: ## Read 10,000 objects of each kind with damaged attributes; a wrong figure without a note fails
 	STYLET_ATTRIBUTES=$(or $(OBJECTS),10000) $(CARGO) test --profile quick -p stylet-files --lib damaged_attributes -- --nocapture
 
-second-reader: ## Compare what Stylet reads with pydicom, ITK, dcmtk, nibabel, highdicom and dicompyler on 266 generated objects (about 15 minutes), then time them
+second-reader: ## Compare what Stylet reads with pydicom, ITK, dcmtk, nibabel, highdicom and dicompyler on 265 generated objects (about 15 minutes), then time them
 	@docs/tools/need dcmtk dicom3tools python3-venv time
 	$(CARGO) build --profile quick --workspace --bin host-ui --bin stylet-clinic $(COMPRESSED)
 	python3 -m venv $(BIN)/second-reader && $(BIN)/second-reader/bin/pip install -q -r tests/oracles/clinic/requirements.txt

@@ -1,4 +1,4 @@
-"""Compares what Stylet reads with what other programs read, on 266 generated objects and 4 studies that it writes; fails above the bars.
+"""Compares what Stylet reads with what other programs read, on 265 generated objects and 4 studies that it writes; fails above the bars.
 
     python run.py HOST-UI FOLDER [KIND ...]     KIND: images, structures, doses, plans, labels, histograms, segmentations, compressed
 """

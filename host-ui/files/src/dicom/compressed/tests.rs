@@ -153,6 +153,7 @@ fn broken_streams_are_refused() {
 fn other_methods_are_refused_by_name() {
     for (syntax, part) in [
         ("1.2.840.10008.1.2.4.201", "1.2.840.10008.1.2.4.201"),
+        (uids::JPEGXL_LOSSLESS, uids::JPEGXL_LOSSLESS),
         #[cfg(not(feature = "compressed"))]
         (
             uids::JPEG2000_LOSSLESS,
