@@ -1,4 +1,4 @@
-//! JPEG, JPEG-LS and JPEG 2000 by the decoders of other projects, which are given only streams of the size in the header.
+//! JPEG, JPEG-LS and JPEG 2000 by decoders of other projects, which get only streams of the size in the header.
 
 use super::{Codec, Layout};
 use crate::error::{ContentError, invalid};
