@@ -1,6 +1,8 @@
 //! Readers of files against those written by other programs, and against hostile input.
 
 #[cfg(test)]
+mod cases;
+#[cfg(test)]
 mod corpus;
 #[cfg(test)]
 mod dicom;
