@@ -75,8 +75,8 @@ fn nothing_sinks_in_or_pulls_whatever_the_hand_does() {
         );
         let calls = heap::calls_of_this_thread();
         let response = step(&fixture.probe, &mut state, &pose(at.into(), axis.into()), &[]);
-        displace(&fixture.probe, &mut state);
         assert_eq!(heap::calls_of_this_thread(), calls, "tick {tick} touched the heap");
+        displace(&fixture.probe, &mut state);
         let report = state.report();
         worst_m = worst_m.max(report.open_m);
         passes.push(report.passes);
