@@ -40,7 +40,7 @@ pub fn text(keys: &str) -> String {
 }
 
 /// Returns the study of a text and the plan above, or each problem with it.
-pub fn study_in(folder: &Path, text: &str) -> Result<Study, Vec<String>> {
+fn study_in(folder: &Path, text: &str) -> Result<Study, Vec<String>> {
     std::fs::write(folder.join("plan.toml"), PLAN).expect("a folder of the test");
     Study::of_text(text, folder).map_err(|problems| problems.0.iter().map(ToString::to_string).collect())
 }

@@ -62,7 +62,7 @@ const CLINICAL: [(&str, &str, Kind); 28] = [
 /// Options for one clinical file alone.
 const ALONE: [(&str, &str); 3] = [("find-seeds", "ct"), ("check", "file"), ("picture", "scene")];
 /// Options for files and folders that are of no patient: sources, results, recordings, studies.
-const OTHERS: [&str; 16] = [
+const OTHERS: [&str; 17] = [
     "class",
     "core",
     "csv",
@@ -74,6 +74,7 @@ const OTHERS: [&str; 16] = [
     "motion",
     "motion_2",
     "out",
+    "program",
     "recording",
     "sheets",
     "source",

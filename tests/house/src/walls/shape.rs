@@ -9,10 +9,6 @@ pub const LINES: usize = 400;
 /// Path suffixes of files that may be longer, and why.
 pub const LONGER: &[(&str, &str)] = &[
     (
-        "fake-libhd/src/abi.rs",
-        "the driver's C interface, whole and in the order of its header",
-    ),
-    (
         "tests/system/device_libhd.rs",
         "one fault of a driver after another over one fixture",
     ),
