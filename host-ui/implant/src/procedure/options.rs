@@ -12,7 +12,7 @@ pub struct Options {
     /// Core and scene.
     #[command(flatten)]
     pub core: CoreArgs,
-    /// Folder for the results [default: out/procedure-<UTC time>]
+    /// Folder for the results [default: out/procedure-TIME, in UTC]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Start this rt-core when none is running, and end it afterwards
