@@ -235,6 +235,17 @@ pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, ContentError> {
         ));
     }
     let across = (slices[count - 1].corner - slices[0].corner) / (count - 1) as f64;
+    let aside = |(i, s): (usize, &Slice)| {
+        let from_row_mm = s.corner - slices[0].corner - across * i as f64;
+        (from_row_mm - normal * from_row_mm.dot(&normal)).norm()
+    };
+    let most_aside = slices.iter().enumerate().map(aside).fold(0.0, f64::max);
+    if most_aside > 2.0 * ROUNDED_MM {
+        return Err(invalid!(
+            "an image of its series lies {most_aside:.3} mm aside of the others ({}); export it again",
+            name(tags::IMAGE_POSITION_PATIENT)
+        ));
+    }
     let columns = Matrix3::from_columns(&[first.steps[0], first.steps[1], across].map(|c| ras_from_lps(c) * 1e-3));
     let mut frame = VoxelFrame::new(columns, ras_from_lps(slices[0].corner) * 1e-3, "image series")?;
     if most_off > UNEVEN * step {

@@ -166,6 +166,19 @@ fn positions_that_are_rounded_too_coarsely_are_refused_as_such() {
     assert!(why.contains("seem to be rounded"), "{why}");
 }
 
+/// A slice that is shifted within its plane used to be read where it is not.
+#[test]
+fn a_slice_aside_of_the_others_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write_series(folder.path(), "2.25.11", &[0, 1, 3]);
+    let mut moved = slice("2.25.11", 2);
+    let place_mm = place_mm(2, 0, 2);
+    moved.put(decimals(tags::IMAGE_POSITION_PATIENT, place_mm.as_slice()));
+    put(folder.path(), "moved.dcm", moved);
+    let why = read(folder.path(), &Progress::default()).unwrap_err().to_string();
+    assert!(why.contains("mm aside of the others"), "{why}");
+}
+
 #[test]
 fn missing_and_duplicate_slices_are_reported() {
     for slices in [&[0, 1, 3][..], &[0][..]] {
