@@ -1,7 +1,7 @@
 //! Invalid records in shared memory neither crash nor stop either side, and are refused with a reason.
 
 use bytemuck::{Pod, Zeroable, pod_read_unaligned};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkStatus};
 use stylet_ports::{self as service, Meeting, Node, StateWriter};
 use stylet_shm_schema::*;
@@ -96,6 +96,8 @@ fn core_refuses_invalid_records_of_hosts_and_runs_on() {
 
 /// More than 10,000 values of each kind of message.
 const ROUNDS: usize = 50;
+/// Values that the host has dropped by then.
+const DROPPED: u64 = 10_000;
 
 #[test]
 fn host_drops_invalid_records_of_a_core_and_goes_on() {
@@ -130,7 +132,13 @@ fn host_drops_invalid_records_of_a_core_and_goes_on() {
         invalid::<SceneHeader>(),
     );
     let mut sent = 0;
-    for i in (0..states.len()).cycle().take(ROUNDS * states.len()) {
+    // On a busy machine the link's thread meets the core some rounds later.
+    let begun = Instant::now();
+    for (n, i) in (0..states.len()).cycle().enumerate() {
+        let is_enough = n >= ROUNDS * states.len() && link.invalid_dropped() > DROPPED;
+        if is_enough || begun.elapsed() > Duration::from_secs(30) {
+            break;
+        }
         good.time_ns += 1;
         sessions.send(good).expect("sent");
         board.write(&states[i]);
@@ -152,7 +160,7 @@ fn host_drops_invalid_records_of_a_core_and_goes_on() {
         link.poll();
     }
     assert!(
-        link.invalid_dropped() > 10_000,
+        link.invalid_dropped() > DROPPED,
         "{} values were dropped",
         link.invalid_dropped()
     );
