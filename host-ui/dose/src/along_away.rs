@@ -43,7 +43,7 @@ impl Entry {
     }
 }
 
-/// Computed rates beside the published ones.
+/// Computed and published rates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
     /// Entries outside the capsule.

@@ -69,7 +69,7 @@ pub enum PlanProblem {
     /// Another format, or another version of it.
     #[error("format is \"{0}\"; it must be \"{FORMAT}\"")]
     Format(String),
-    /// A dose that nobody prescribes.
+    /// An implausible prescription.
     #[error("prescription_gy is {0}; it must be 0.001 to 10000")]
     Prescription(f64),
     /// No needle.

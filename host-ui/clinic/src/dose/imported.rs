@@ -48,7 +48,7 @@ impl Checked {
 }
 
 impl DoseArgs {
-    /// Evaluates the dose of a file, beside that of the seeds if there are any.
+    /// Evaluates the dose of a file, and compares it with that of the seeds if there are any.
     pub(super) fn run_imported(&self, file: &Path, identity: Option<&Identity>) -> Result<(), CommandError> {
         let c = &self.common;
         let drawn = self.structures.as_deref().ok_or("--rt-dose needs --structures FILE")?;

@@ -124,7 +124,7 @@ pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64, bin_gy: f
     csv(path, &header, rows)
 }
 
-/// Writes the measures of an imported dose beside those of the TG-43U1 dose; an empty field is undefined.
+/// Writes the measures of an imported dose and of the TG-43U1 dose; an empty field is undefined.
 pub fn second_check(path: &Path, measures: &[Checked]) -> Result<(), CommandError> {
     let header = owned(&["measure [unit]", "tg43", "imported", "difference", "difference_percent"]);
     let rows = measures.iter().map(|m| {

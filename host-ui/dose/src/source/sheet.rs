@@ -33,7 +33,7 @@ pub struct Imported {
     pub text: String,
     /// The source as its file gives it.
     pub source: Source,
-    /// Its dose rates beside those of the sheets.
+    /// Comparison of its dose rates with those of the sheets.
     pub comparison: Option<Comparison>,
     /// Remarks for the user: what was left out, filled in or assumed.
     pub notes: Vec<String>,

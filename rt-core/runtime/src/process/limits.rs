@@ -35,7 +35,7 @@ pub enum LimitError {
         /// Error of the system.
         why: std::io::Error,
     },
-    /// Shared memory that nobody may write.
+    /// Shared memory that cannot be written.
     #[error("shared memory at {0} is read-only: sudo mount -o remount,rw {0}")]
     ReadOnly(String),
     /// Shared memory that this user may not write.

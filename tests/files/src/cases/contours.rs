@@ -27,7 +27,7 @@ fn save_set(folder: &Path, structures: &[(&str, &str, Vec<Contour>)]) {
     std::fs::write(folder.join("seeds.csv"), "x_mm,y_mm,z_mm,strength_u\n0,0,0,0.5\n").expect("written");
 }
 
-/// Makes a prostate of changed contours beside a rectum.
+/// Makes a prostate of changed contours, and a rectum.
 fn prostate_of(change: impl Fn(Vec<Contour>) -> Vec<Contour> + 'static) -> impl Fn(&Path) {
     move |folder| {
         save_set(

@@ -13,7 +13,7 @@ pub struct Grid {
     pub values: Vec<Vec<Option<f64>>>,
 }
 
-/// Radii and the columns of g(r) beside them, each with its heading.
+/// Radii and columns of g(r), each with its heading.
 #[derive(PartialEq)]
 pub struct Radial {
     pub r_cm: Vec<f64>,
@@ -86,7 +86,7 @@ impl Cells {
         found.map(in_cm).collect()
     }
 
-    /// Returns all `key = value unit`, in one cell or in several beside each other.
+    /// Returns all `key = value unit`, in one cell or in adjacent ones.
     fn assigned<'a>(&'a self, keys: &'a [&str]) -> impl Iterator<Item = (String, f64, String)> + 'a {
         let cells = self
             .0
