@@ -52,9 +52,9 @@ Examples:
   host-ui dose --source sources/pd103_200.toml --seeds seeds.csv --from-days 0 --to-days 30 --spacing-mm 2 --out dose
   host-ui dose --rt-dose rtdose.dcm --structures rtstruct.dcm --seeds rtplan.dcm --source sources/i125_6711.toml --out check
 
-Written to --out, a new or empty folder: dose_points.csv; dvh.csv, dvh.svg, metrics.json and report.html (one page by TG-137, A4);
-dose_grid.csv when neither points nor structures are given; second_check.csv for an imported dose of seeds, whose dvh.svg has the TG-43U1
-dose dashed; made.json, which names every input with its SHA-256, the version and the time.";
+Written to --out, a new or empty folder: dose_points.csv; dvh.csv, dvh.svg and metrics.json; without --rt-dose also report.html (one
+page by TG-137, A4); dose_grid.csv when neither points nor structures are given; second_check.csv for an imported dose of seeds, whose
+dvh.svg has the TG-43U1 dose dashed; made.json, which names every input with its SHA-256, the version and the time.";
 
 #[derive(Args, Debug)]
 #[command(after_long_help = DOSE_HELP, mut_arg("source", |arg| arg.required(false).required_unless_present("rt_dose")))]
