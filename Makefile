@@ -6,8 +6,9 @@ RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),
 BIN := $(or $(CARGO_TARGET_DIR),target)/quick
 SIMULATOR = --bin rt-core --bin stylet-bridge --bin host-ui
 PRODUCTS = --bin stylet-lab --bin stylet-study --bin stylet-clinic --bin stylet-igtl
-# Decoders of JPEG, JPEG-LS and JPEG 2000: in the packages, not in what is built to develop.
+# In the packages, not in what is built to develop: decoders of JPEG, JPEG-LS and JPEG 2000; screen readers.
 COMPRESSED = --features stylet-files/compressed
+PACKAGED = $(COMPRESSED) --features host-ui/screen-reader
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
 .PHONY: attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
@@ -39,7 +40,7 @@ test-all: test ## Then test the products, and the programs with whole processes,
 	$(CARGO) test --profile quick -p stylet-files --lib $(COMPRESSED) -- compressed::
 
 build-release: ## Build the programs as the packages hold them, with every dependency optimised
-	$(CARGO) build --release --workspace $(SIMULATOR) $(PRODUCTS) $(COMPRESSED)
+	$(CARGO) build --release --workspace $(SIMULATOR) $(PRODUCTS) $(PACKAGED)
 
 package: deps-package build-release ## Build the Debian packages of both programs, into target/package
 	docs/tools/package "$(SHIPPED)"
