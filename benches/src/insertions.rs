@@ -20,8 +20,6 @@ pub struct Insertion {
     pub speed_m_per_s: f64,
     /// Set where the tip passes from element to element after the push, each carried less far.
     pub passes_on: bool,
-    /// Parameters are fitted to these; the others are held back.
-    pub fitted: bool,
 }
 
 /// Straight in, slowly, and half the way back.
@@ -32,24 +30,17 @@ const SLOWLY: Insertion = Insertion {
     travel_m: 5e-3,
     speed_m_per_s: 0.05,
     passes_on: false,
-    fitted: false,
+};
+
+/// Insertion by which spacings are compared.
+pub const MIDDLE: Insertion = Insertion {
+    name: "middle, 5 mm",
+    start_mm: [0.0, 0.0, -6.0],
+    ..SLOWLY
 };
 
 /// Insertions that are measured in the gland.
-pub const GLAND: [Insertion; 6] = [
-    Insertion {
-        name: "middle, 5 mm",
-        start_mm: [0.0, 0.0, -6.0],
-        fitted: true,
-        ..SLOWLY
-    },
-    Insertion {
-        name: "side, 3 mm",
-        start_mm: [9.0, 2.0, -4.0],
-        travel_m: 3e-3,
-        fitted: true,
-        ..SLOWLY
-    },
+pub const GLAND: [Insertion; 4] = [
     Insertion {
         name: "base, 7 mm",
         start_mm: [-5.0, -3.0, 6.0],

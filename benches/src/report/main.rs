@@ -1,7 +1,6 @@
 //! `make report`: every tissue model over the same insertions; speed, error, and what to pick.
 
 mod budget;
-mod fit;
 mod models;
 mod page;
 mod runs;
@@ -9,7 +8,6 @@ mod ships;
 mod table;
 
 use clap::Parser;
-use fit::Lesson;
 use models::{converged, entries};
 use page::Refinement;
 use runs::{Reference, run};
@@ -18,9 +16,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 use stylet_benches::bodies::{SPACINGS_M, gland};
 use stylet_benches::error::{apart, quantile, rms};
-use stylet_benches::insertions::{GLAND, Insertion, TICK_S};
+use stylet_benches::insertions::{GLAND, Insertion, MIDDLE, TICK_S};
 use stylet_benches::machine;
-use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
 use stylet_sim::tissue::{Held, MaterialPoint, TissueModel};
 use table::{Row, Where, row};
@@ -52,21 +49,18 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Ok(());
     }
     let causes = budget::causes();
-    eprintln!("fitting ChainMail to the converged FEM ...");
-    let fitted = fit_at(SPACINGS_M[1]);
     let mut rows = Vec::new();
     for spacing_m in SPACINGS_M {
         let scene = gland(spacing_m);
         for insertion in &GLAND {
             eprintln!("{:.2} mm, {} ...", spacing_m * 1e3, insertion.name);
-            rows.extend(measure(&scene, insertion, &fitted, options.rounds.max(1)));
+            rows.extend(measure(&scene, insertion, options.rounds.max(1)));
         }
     }
     table::write(&rows, &out.join("speed-vs-error.csv"))?;
     let found = page::Findings {
         machine: &machine,
         points: &table::points(&rows),
-        fitted: &fitted,
         refinement: &refinement(),
         ships: &ships,
         causes: &causes,
@@ -77,25 +71,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn fit_at(spacing_m: f64) -> TissueParameters {
-    let scene = gland(spacing_m);
-    let lessons = GLAND.iter().filter(|i| i.fitted).map(|insertion| {
-        let script = insertion.script(&scene);
-        Lesson {
-            reference: Reference::of(&mut converged(&scene), &script),
-            travel_m: insertion.travel_m,
-            script,
-        }
-    });
-    fit::fit(&scene, &lessons.collect::<Vec<_>>())
-}
-
 /// Runs every model through one insertion, round by round, so that a noisy machine disturbs all alike.
-fn measure(scene: &Scene, insertion: &Insertion, fitted: &TissueParameters, rounds: usize) -> Vec<Row> {
+fn measure(scene: &Scene, insertion: &Insertion, rounds: usize) -> Vec<Row> {
     let script: Vec<Held> = insertion.script(scene);
     let seeds = insertion.seeds(scene);
     let reference = Reference::of(&mut converged(scene), &script);
-    let mut entries = entries(scene, fitted);
+    let mut entries = entries(scene);
     let mut runs: Vec<Vec<_>> = entries.iter().map(|_| Vec::new()).collect();
     for _ in 0..rounds {
         for (entry, runs) in entries.iter_mut().zip(&mut runs) {
@@ -129,9 +110,9 @@ fn refinement() -> Vec<Refinement> {
     SPACINGS_M.iter().zip(&ends).map(row).collect()
 }
 
-/// Returns the displacement of the same places of the gland at the end of the first insertion's push.
+/// Returns the displacement of the same places of the gland at the end of the push in the middle.
 fn seeds_after_push(scene: &Scene) -> Vec<[f64; 3]> {
-    let insertion = &GLAND[0];
+    let insertion = &MIDDLE;
     let push = (insertion.travel_m / (insertion.speed_m_per_s * TICK_S)).ceil() as usize;
     let mut fem = converged(scene);
     let lattice = &scene.lattice;

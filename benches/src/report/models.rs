@@ -23,11 +23,7 @@ pub fn converged(scene: &Scene) -> FemTissue<f64> {
     fem
 }
 
-pub fn chainmail(scene: &Scene, parameters: &TissueParameters) -> ChainMailTissue {
-    ChainMailTissue::new(scene, parameters.validate().expect("fitted settings are valid"))
-}
-
-pub fn entries(scene: &Scene, fitted: &TissueParameters) -> Vec<Entry> {
+pub fn entries(scene: &Scene) -> Vec<Entry> {
     let mut entries = Vec::new();
     let mut add = |model_name, setting: String, model: Box<dyn TissueModel>| {
         entries.push(Entry {
@@ -36,14 +32,12 @@ pub fn entries(scene: &Scene, fitted: &TissueParameters) -> Vec<Entry> {
             model,
         });
     };
-    let paper = TissueParameters::default();
-    for (name, parameters) in [("paper's limits", &paper), ("fitted limits", fitted)] {
-        add(
-            "ChainMail, solved",
-            name.to_owned(),
-            Box::new(chainmail(scene, parameters)),
-        );
-    }
+    let limits = TissueParameters::default().validate().expect("the defaults are valid");
+    add(
+        "ChainMail, solved",
+        "paper's limits".to_owned(),
+        Box::new(ChainMailTissue::new(scene, limits)),
+    );
     for tolerance in TOLERANCES {
         let mut fem = FemTissue::<f32>::new(scene).expect("valid materials");
         fem.settings.relative_tolerance = tolerance;

@@ -7,13 +7,11 @@ use serde::Serialize;
 use std::error::Error;
 use std::fmt::Write as _;
 use stylet_benches::insertions::{GLAND, TICK_S};
-use stylet_sim::limits::TissueParameters;
 
 /// Everything that the page is written from.
 pub struct Findings<'a> {
     pub machine: &'a [(String, String)],
     pub points: &'a [Point],
-    pub fitted: &'a TissueParameters,
     pub refinement: &'a [Refinement],
     /// Shipped models against the converged solution of each tick.
     pub ships: &'a [Ships],
@@ -32,7 +30,7 @@ pub struct Refinement {
 
 pub fn write(found: &Findings) -> Result<String, Box<dyn Error>> {
     let mut text = String::from("# Speed against error of the tissue models\n");
-    let names = |fitted: bool| GLAND.iter().filter(move |i| i.fitted == fitted).map(|i| i.name);
+    let names = GLAND.map(|insertion| insertion.name);
     let of_models = format!(
         "The same insertions through every model, on the paper's gland cut at three spacings, in surroundings of the same stiffness. \
          Error: distance from the converged finite elements (f64) on the same lattice, over the elements that they move by more than \
@@ -40,15 +38,9 @@ pub fn write(found: &Findings) -> Result<String, Box<dyn Error>> {
          *best shift* are the errors without a model, and of the body shifted as one piece by what fits each tick best. Means over \
          the insertions {}; `speed-vs-error.csv` has each.",
         TICK_S * 1e3,
-        names(false).collect::<Vec<_>>().join("; "),
+        names.join("; "),
     );
     section(&mut text, "Every model", &of_models, found.points)?;
-    writeln!(
-        text,
-        "Fitted at 1.5 mm to {}: {:?}",
-        names(true).collect::<Vec<_>>().join("; "),
-        found.fitted
-    )?;
     section(
         &mut text,
         "What ships",

@@ -13,7 +13,6 @@ pub struct Row {
     pub spacing_mm: f64,
     pub elements: usize,
     pub insertion: &'static str,
-    pub fitted_to: bool,
     pub model: &'static str,
     pub setting: String,
     pub travel_mm: f64,
@@ -56,7 +55,6 @@ pub fn row(place: &Where, insertion: &Insertion, entry: &Entry, rounds: &[Run]) 
         spacing_mm: place.spacing_m * mm,
         elements: place.elements,
         insertion: insertion.name,
-        fitted_to: insertion.fitted,
         model: entry.model_name,
         setting: entry.setting.clone(),
         travel_mm: insertion.travel_m * mm,
@@ -84,7 +82,7 @@ pub fn write(rows: &[impl Serialize], path: &Path) -> Result<(), csv::Error> {
     writer.flush().map_err(Into::into)
 }
 
-/// Mean over the insertions that were held back, of one model and setting at one spacing.
+/// Mean over the insertions, of one model and setting at one spacing.
 #[derive(Clone, Debug, Serialize)]
 pub struct Point {
     pub spacing_mm: f64,
@@ -104,9 +102,8 @@ pub struct Point {
 }
 
 pub fn points(rows: &[Row]) -> Vec<Point> {
-    let held_back = rows.iter().filter(|row| !row.fitted_to);
     let mut groups: Vec<Vec<&Row>> = Vec::new();
-    for row in held_back {
+    for row in rows {
         let key = |row: &Row| (row.spacing_mm.to_bits(), row.model, row.setting.clone());
         match groups.iter_mut().find(|group| key(group[0]) == key(row)) {
             Some(group) => group.push(row),
