@@ -3,8 +3,6 @@
 use crate::error::ContentError;
 
 mod agree;
-#[cfg(test)]
-mod attributes;
 mod charset;
 mod checked;
 mod compressed;
@@ -60,3 +58,6 @@ pub fn image_geometry(bytes: &[u8]) -> Result<(), ContentError> {
     let slice = read?;
     images::grid(vec![slice.clone(), slice]).map(|_| ())
 }
+
+#[cfg(test)]
+mod tests;

@@ -13,8 +13,6 @@
 )]
 
 pub mod arm;
-#[cfg(test)]
-pub(crate) mod breaking;
 pub mod capacities;
 pub mod clock;
 pub mod contact;
@@ -44,3 +42,6 @@ pub mod tissue_tape;
 pub mod watchdog;
 pub mod wiring;
 pub mod world;
+
+#[cfg(test)]
+pub(crate) mod tests;

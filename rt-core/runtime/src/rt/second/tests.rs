@@ -4,9 +4,9 @@
 use super::*;
 use crate::replay;
 use crate::replay::file::{Flight, SecondFigures};
-use crate::rt::breaking::{BreakingDevice, Cause};
 use crate::rt::capacities::Capacities;
 use crate::rt::motion_lease::Promise;
+use crate::rt::tests::{BreakingDevice, Cause};
 use crate::rt::watchdog::{OVERRUN_STREAK, SILENT_SAMPLES, STALE_TISSUE_NS};
 use nalgebra::SMatrix;
 use std::sync::Arc;

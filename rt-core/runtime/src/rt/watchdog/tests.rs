@@ -2,11 +2,11 @@
 //! returns after re-arming.
 
 use super::*;
-use crate::rt::breaking::{BreakingDevice, Cause};
 use crate::rt::exchange::{Happened, HapticOrder, Notice};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
 use crate::rt::response::TissueResponse;
+use crate::rt::tests::{BreakingDevice, Cause};
 use crate::rt::wiring::{Capacities, ControlPorts, TissuePorts, Wiring};
 use nalgebra::Vector3;
 use std::sync::Arc;
