@@ -35,8 +35,8 @@ pub enum Action {
     Trainee(TraineeAction),
     Probe(ProbeAction),
     RunAll,
-    /// Answers the question that a standing fault raises: re-arm and begin, or not.
-    Rearm(bool),
+    /// Answers the question of the window.
+    Answer(bool),
     /// Inserts all needles again, from a reset.
     StartOver,
     StopRun,
@@ -131,6 +131,8 @@ pub enum PlanAction {
     /// Takes a proposal of the automatic plan, by its index.
     Choose(usize),
     Discard,
+    /// Restores the plan that was discarded.
+    Restore,
     Add(Hole),
     Remove(usize),
     Move(usize, Hole),

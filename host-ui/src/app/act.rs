@@ -3,7 +3,7 @@
 use super::drive::{BEFORE_ENTRY_M, Drive, Goal};
 use super::{App, Waiting};
 use crate::action::Action;
-use crate::panel::rearm::Begin;
+use crate::panel::question::{Begin, Question};
 use crate::panel::workflow::{Undo, next_action, undo_action};
 use crate::planner::Edit;
 use crate::settings::ThemeChoice;
@@ -67,7 +67,28 @@ impl App {
         self.send(what, &request);
     }
 
+    /// Executes a request, or asks first if it removes what is in the tissue.
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
+        let question = Question::before(&action, &self.shown).filter(|_| self.run.is_none() && !self.watches());
+        match question {
+            Some(question) => self.question = Some(question),
+            None => self.execute(action, ctx),
+        }
+    }
+
+    /// Continues with what waited for the answer.
+    fn answer(&mut self, is_agreed: bool, ctx: &egui::Context) {
+        match self.question.take().filter(|_| is_agreed) {
+            Some(Question::Rearm(begin)) => self.rearm(begin),
+            Some(Question::Remove(_, action)) => {
+                self.save_implant("before-reset");
+                self.execute(action, ctx);
+            }
+            None => {}
+        }
+    }
+
+    fn execute(&mut self, action: Action, ctx: &egui::Context) {
         match action {
             Action::ToggleHelp => self.help = !self.help,
             Action::ToggleClass => self.class = !self.class,
@@ -132,13 +153,17 @@ impl App {
             Action::Redo => {}
             Action::Undo => match undo_action(&self.shown) {
                 Some(Undo::Seed) => self.send("Undo seed", &Request::UndoSeed),
-                Some(Undo::Plan) => self.withdraw_plan(),
+                Some(Undo::Plan) => {
+                    self.planner.step_back();
+                    self.withdraw_plan("Withdraw the plan");
+                }
+                Some(Undo::Discard) => self.restore_plan(),
                 None => {}
             },
             Action::Plan(action) => self.act_on_plan(action),
             Action::RunAll => self.begin_run(Begin::WhereItWas),
             Action::StartOver => self.begin_run(Begin::Anew),
-            Action::Rearm(is_agreed) => self.answer_rearm(is_agreed),
+            Action::Answer(is_agreed) => self.answer(is_agreed, ctx),
             Action::PlanSeeds => {
                 if let Some(scene) = &self.shown.scene {
                     let plan = self.by_hand(default_plan(scene));
@@ -169,7 +194,7 @@ impl App {
     }
 
     /// Sends an empty list of seeds: the plan is withdrawn.
-    fn withdraw_plan(&mut self) {
+    pub(super) fn withdraw_plan(&mut self, what: &'static str) {
         if let Some(plan) = &self.shown.plan {
             let withdrawn = PlannedNeedle {
                 entry_m: plan.entry_m,
@@ -177,8 +202,7 @@ impl App {
                 seeds_m: Vec::new(),
                 prescribed: Default::default(),
             };
-            self.planner.step_back();
-            self.send("Withdraw the plan", &Request::SetPlan(Some(withdrawn)));
+            self.send(what, &Request::SetPlan(Some(withdrawn)));
         }
     }
 

@@ -58,14 +58,20 @@ impl App {
         let was_absent = std::mem::replace(&mut self.was_absent, is_absent);
         let has_ended = is_absent && !was_absent;
         let is_own = self.trainees.followed.is_none() && !self.watches();
-        if !has_ended || !is_own || self.shown.seeds.is_empty() {
-            return;
+        if has_ended && is_own {
+            self.save_implant("core-ended");
         }
-        let folder = PathBuf::from(format!("out/core-ended-{}", format::utc_now()));
+    }
+
+    /// Writes plan and debrief, as far as there are any, to a new folder under out/.
+    pub(super) fn save_implant(&mut self, why: &str) {
+        let folder = PathBuf::from(format!("out/{why}-{}", format::utc_now()));
         if self.shown.planning.implant.is_some() && std::fs::create_dir_all(&folder).is_ok() {
             self.planner.export(folder.join("plan.toml"), self.scene_file());
         }
-        self.save_debrief_as(folder);
+        if !self.shown.seeds.is_empty() {
+            self.save_debrief_as(folder);
+        }
     }
 
     pub(super) fn save_debrief_as(&mut self, folder: PathBuf) {

@@ -4,7 +4,7 @@ use super::{App, patch};
 use crate::action::Action;
 use crate::panel::instructor::instructor_ui;
 use crate::panel::parameters::parameters_ui;
-use crate::panel::rearm::rearm_ui;
+use crate::panel::question::question_ui;
 use crate::panel::review::review_ui;
 use crate::panel::trainees::trainees_ui;
 use crate::panel::workflow::{Progress, editor_ui, foot_height, foot_ui, run_ui, workflow_ui};
@@ -64,7 +64,7 @@ impl App {
         ));
         let list = &self.trainees;
         actions.extend(trainees_ui(ui.ctx(), &list.glances, list.followed));
-        actions.extend(rearm_ui(ui.ctx(), &self.shown, self.asks_rearm));
+        actions.extend(question_ui(ui.ctx(), &self.shown, self.question.as_ref()));
         help::help_ui(ui.ctx(), &self.shown, &mut self.help);
         if let Some(patch) = &mut self.patch {
             let tip = self.shown.state.map(|s| s.tip_in_scene_m);

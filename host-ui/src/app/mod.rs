@@ -22,7 +22,7 @@ use crate::loader::Loader;
 use crate::panel::history::History;
 use crate::panel::instructor::InstructorState;
 use crate::panel::parameters::ParametersState;
-use crate::panel::rearm::Begin;
+use crate::panel::question::Question;
 use crate::panel::workflow::WorkflowState;
 use crate::picture::Pictures;
 use crate::planner::Planner;
@@ -119,8 +119,8 @@ pub struct App {
     run: Option<Run>,
     /// True if the core was absent in the last frame.
     was_absent: bool,
-    /// Run that waits for a person to re-arm.
-    asks_rearm: Option<Begin>,
+    /// Question that waits for an answer.
+    question: Option<Question>,
     script: plan::Script,
     placed_found: Instant,
     planner: Planner,
@@ -239,7 +239,7 @@ impl App {
             },
             run: None,
             was_absent: true,
-            asks_rearm: None,
+            question: None,
             script: plan::Script::default(),
             placed_found: Instant::now(),
             planner,
@@ -346,7 +346,7 @@ impl eframe::App for App {
         if ctx.input(|i| i.key_pressed(egui::Key::Escape)) {
             (self.help, self.class, self.parameters.open) = (false, false, false);
             self.instructor.close();
-            self.asks_rearm = None;
+            self.question = None;
         }
         for action in actions {
             self.act(action, &ctx);

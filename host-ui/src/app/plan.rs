@@ -3,7 +3,7 @@
 use super::App;
 use super::drive::Drive;
 use crate::action::PlanAction;
-use crate::panel::rearm::Begin;
+use crate::panel::question::{Begin, Question};
 use crate::panel::workflow::Progress;
 use crate::settings::Layout;
 use nalgebra::Vector3;
@@ -64,7 +64,11 @@ impl App {
             PlanAction::Begin => planner.begin(),
             PlanAction::Automatic => planner.automatic(),
             PlanAction::Choose(number) => planner.choose(number),
-            PlanAction::Discard => planner.discard(),
+            PlanAction::Discard => {
+                planner.discard();
+                self.withdraw_plan("Discard the plan");
+            }
+            PlanAction::Restore => self.restore_plan(),
             PlanAction::Add(hole) => planner.add(hole),
             PlanAction::Remove(needle) => planner.edit(|plan| plan.without_needle(needle)),
             PlanAction::Move(needle, hole) => planner.edit(|plan| plan.with_needle_at(needle, hole)),
@@ -107,12 +111,25 @@ impl App {
         let Some(number) = self.planner.next_needle() else {
             return;
         };
-        let Some(task) = self.planner.task(number) else { return };
+        self.planner.begin_needle(number, self.shown.seeds.len());
+        self.publish("Next needle", number);
+    }
+
+    fn publish(&mut self, what: &'static str, needle: usize) {
+        let Some(task) = self.planner.task(needle) else { return };
         let mut plan = task.plan;
         // Compensation may shift the entry a little from the hole.
         plan.entry_m = task.drops.entry_m;
-        self.planner.begin_needle(number, self.shown.seeds.len());
-        self.send("Next needle", &Request::SetPlan(Some(plan.clone())));
+        self.send(what, &Request::SetPlan(Some(plan)));
+    }
+
+    /// Restores the plan that was discarded, and the path of its needle at work.
+    pub(super) fn restore_plan(&mut self) {
+        if self.planner.restore()
+            && let Some(number) = self.planner.progress().begun().checked_sub(1)
+        {
+            self.publish("Restore the plan", number);
+        }
     }
 
     /// Moves the axial slice to the plane that the template shows.
@@ -165,7 +182,7 @@ impl App {
     /// Begins a run, or asks first if a fault stands: only a person re-arms.
     pub(super) fn begin_run(&mut self, begin: Begin) {
         if self.shown.stands_fault().is_some() {
-            self.asks_rearm = Some(begin);
+            self.question = Some(Question::Rearm(begin));
             return;
         }
         match begin {
@@ -174,10 +191,7 @@ impl App {
         }
     }
 
-    pub(super) fn answer_rearm(&mut self, is_agreed: bool) {
-        let Some(begin) = self.asks_rearm.take().filter(|_| is_agreed) else {
-            return;
-        };
+    pub(super) fn rearm(&mut self, begin: Begin) {
         match begin {
             Begin::WhereItWas => self.run_all(),
             Begin::Anew => self.start_over(),

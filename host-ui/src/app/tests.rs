@@ -6,7 +6,7 @@ pub(crate) mod fixture;
 mod guide;
 mod held;
 mod pictures;
-mod rearm;
+mod question;
 mod text;
 mod update;
 mod whole;

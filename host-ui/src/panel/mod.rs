@@ -10,7 +10,7 @@ pub mod history;
 pub mod instructor;
 pub mod parameters;
 pub mod plots;
-pub mod rearm;
+pub mod question;
 pub mod review;
 pub mod setup;
 pub mod status;

@@ -1,6 +1,6 @@
 //! Changes of the plan, each one step to undo, and the limits on them.
 
-use super::{Failure, NeedleProgress, Planner};
+use super::{Failure, Planner};
 use std::time::{Duration, Instant};
 use stylet_implant::plan::{History, Hole, ImplantPlan, Row, exchange};
 use stylet_shm_schema::MAX_SEEDS;
@@ -32,16 +32,12 @@ impl Planner {
         }
     }
 
-    /// Discards the plan; one needle remains.
+    /// Discards the plan until [`Planner::restore`].
     pub fn discard(&mut self) {
         self.cancel();
-        (self.history, self.problems, self.planning.proposals) = (None, None, None);
-        if let (Some(folder), Some(outlines)) = (&self.kept_in, &self.planning.outlines) {
-            // Usually there is no file.
-            let _removed = std::fs::remove_file(super::kept::path_of(folder, outlines.scene));
-        }
-        self.compensated.clear();
-        self.planning.progress = NeedleProgress::default();
+        self.set_aside();
+        (self.problems, self.planning.proposals) = (None, None);
+        self.to_keep = true;
         self.change();
     }
 

@@ -1,13 +1,14 @@
-//! A copy of the plan being inserted, next to the core's shared memory. A window that was closed or
-//! killed finds it again during the same run of the core, and it is deleted with the core.
+//! Plans that are kept: a copy of the present one next to the core's shared memory, and those set aside in the window.
+//!
+//! A window that was closed or killed finds the copy again during the same run of the core. It is deleted with the core.
 
-use super::{Note, Planner};
+use super::{NeedleProgress, Note, Planner};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use stylet_anatomy::PatientFrame;
 use stylet_base::job::{Job, JobUpdate};
 use stylet_base::{input, write_whole};
-use stylet_implant::plan::{Compensation, ImplantPlan, Needle, file};
+use stylet_implant::plan::{Compensation, History, ImplantPlan, Needle, file};
 use stylet_shm_schema::SceneId;
 
 /// Largest size of a file; a larger one is not a plan of ours.
@@ -19,6 +20,15 @@ pub struct KeptPlan {
     pub plan: ImplantPlan,
     /// Rehearsed needles with their compensation.
     pub compensated: Vec<(Needle, Compensation)>,
+}
+
+/// Plan out of use, with its history, compensation and progress.
+pub(super) struct Aside {
+    of_scene: Option<(String, [f64; 3])>,
+    body: Option<u64>,
+    history: History<ImplantPlan>,
+    compensated: Vec<(Needle, Compensation)>,
+    progress: NeedleProgress,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -95,19 +105,61 @@ impl Planner {
         }
     }
 
-    /// Writes the plan for another window, on a separate thread.
-    pub(super) fn keep(&self) {
-        if let (Some(folder), Some(outlines), Some(plan)) = (&self.kept_in, &self.planning.outlines, self.plan()) {
-            let (path, frames) = (path_of(folder, outlines.scene), outlines.frames);
-            let kept = KeptPlan {
-                plan: plan.clone(),
-                compensated: self.compensated.clone(),
-            };
-            // The thread ends by itself; another window looks for its file.
-            let _writes = std::thread::Builder::new()
-                .name("keep plan".to_owned())
-                .spawn(move || kept.write(&path, &frames));
+    /// Writes the plan for another window, on a separate thread, or deletes a discarded one; one after the other.
+    pub(super) fn write_kept(&mut self) {
+        let writes = |job: &Job<()>| matches!(job.poll(), JobUpdate::Pending);
+        if !self.to_keep || self.keeping.as_ref().is_some_and(writes) {
+            return;
         }
+        let (Some(folder), Some(outlines)) = (&self.kept_in, &self.planning.outlines) else {
+            return;
+        };
+        self.to_keep = false;
+        let (path, frames) = (path_of(folder, outlines.scene), outlines.frames);
+        let kept = self.plan().map(|plan| KeptPlan {
+            plan: plan.clone(),
+            compensated: self.compensated.clone(),
+        });
+        self.keeping = Some(Job::begin("keep plan", move |_, _| match kept {
+            Some(kept) => kept.write(&path, &frames),
+            // Usually there is no file.
+            None => drop(std::fs::remove_file(&path)),
+        }));
+    }
+
+    /// Puts the plan aside.
+    pub(super) fn set_aside(&mut self) {
+        let Some(history) = self.history.take() else { return };
+        self.aside.retain(|aside| aside.of_scene != self.of_scene);
+        self.aside.push(Aside {
+            of_scene: self.of_scene.clone(),
+            body: self.body,
+            history,
+            compensated: std::mem::take(&mut self.compensated),
+            progress: std::mem::take(&mut self.planning.progress),
+        });
+    }
+
+    /// Returns whether there is no plan, and one of this scene was set aside.
+    pub(super) fn can_restore(&self) -> bool {
+        self.history.is_none() && self.aside.iter().any(|aside| aside.of_scene == self.of_scene)
+    }
+
+    /// Restores the plan of this scene that was set aside, as it was; returns whether there was one.
+    pub fn restore(&mut self) -> bool {
+        if !self.can_restore() {
+            return false;
+        }
+        let of_scene = self.of_scene.clone();
+        if let Some(at) = self.aside.iter().position(|aside| aside.of_scene == of_scene) {
+            let aside = self.aside.swap_remove(at);
+            (self.history, self.body) = (Some(aside.history), aside.body);
+            (self.compensated, self.planning.progress) = (aside.compensated, aside.progress);
+            self.message = Some(Note::done("The plan was restored.".to_owned()));
+            self.to_keep = true;
+            self.change();
+        }
+        true
     }
 }
 

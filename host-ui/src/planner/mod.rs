@@ -15,7 +15,7 @@ mod shown;
 use jobs::JobMessage;
 #[cfg(test)]
 pub(crate) use jobs::JobProgress;
-use kept::KeptPlan;
+use kept::{Aside, KeptPlan};
 pub(crate) use needles::NeedleProgress;
 pub use needles::NeedleState;
 pub(crate) use outlines::{AnatomyOutlines, Outline};
@@ -83,6 +83,13 @@ pub struct Planner {
     job: Option<Job<JobMessage>>,
     /// Folder in which the plan is kept for another window; none if not given.
     kept_in: Option<PathBuf>,
+    /// True if plan or compensation changed since the file was last written, and the writing of it.
+    to_keep: bool,
+    keeping: Option<Job<()>>,
+    /// Plans that were discarded or belong to another scene, at most one for each scene.
+    aside: Vec<Aside>,
+    /// Digest of the body for which needles were compensated.
+    body: Option<u64>,
     /// Scene for which a kept plan was looked for, and the search.
     looked: Option<(SceneId, Job<KeptPlan>)>,
     /// Needles at their rehearsal, with their compensation.
@@ -119,6 +126,7 @@ impl Planner {
     pub fn planning(&self) -> Planning {
         Planning {
             review: self.review.shown(self.can_withdraw()),
+            can_restore: self.can_restore(),
             ..self.planning.clone()
         }
     }
@@ -133,6 +141,7 @@ impl Planner {
         if self.planning.progress.is_undone(seeds) {
             self.restart();
         }
+        self.write_kept();
         self.show();
     }
 
@@ -158,21 +167,33 @@ impl Planner {
         let of_scene = (scene.header.name.read(), scene.header.upper_m);
         if self.of_scene.as_ref() != Some(&of_scene) {
             if self.history.is_some() {
-                self.refuse("The plan was for another scene and was discarded.");
+                self.message = Some(Note::done(
+                    "The plan is set aside: it returns with its scene.".to_owned(),
+                ));
             }
+            self.set_aside();
             *self = Self {
                 of_scene: Some(of_scene),
                 message: self.message.take(),
                 revision: self.revision + 1,
                 kept_in: self.kept_in.take(),
+                aside: std::mem::take(&mut self.aside),
                 ..Self::default()
             };
+            // The tissue is new, whatever was in that of before.
+            if self.restore() {
+                self.count_none();
+            }
         }
         if let Some((key, template, job)) = &self.outlining {
             let (key, template) = (*key, *template);
             match job.poll() {
                 JobUpdate::Pending => {}
                 JobUpdate::Message(Ok(outlines)) => {
+                    // Rehearsals hold in a body of the same labels, also under another core.
+                    if self.body.replace(outlines.body) != Some(outlines.body) {
+                        self.compensated.clear();
+                    }
                     self.planning.outlines = Some(Arc::new(outlines));
                     self.outlining = None;
                     self.change();
@@ -189,7 +210,6 @@ impl Planner {
         if !self.planning.outlines.as_ref().is_some_and(is_known) && self.failed != Some((key, template)) {
             if self.planning.outlines.as_ref().is_some_and(|g| g.scene != key) {
                 self.count_none();
-                self.compensated.clear();
             }
             let model = scene.clone();
             let job = Job::begin("anatomy", move |messages, _| {
@@ -215,6 +235,7 @@ impl Planner {
                     self.checking = None;
                     if is_new {
                         self.shown_revision = 0;
+                        self.to_keep = true;
                     }
                 }
                 JobUpdate::Ended => self.checking = None,
@@ -249,6 +270,7 @@ impl Planner {
         if let JobMessage::Compensated(done) = message {
             self.compensated.retain(|(needle, _)| *needle != done.0);
             self.compensated.push(*done);
+            self.to_keep = true;
             return self.refresh();
         }
         self.cancel();
@@ -309,7 +331,7 @@ impl Planner {
 
     /// Marks a needle as being inserted, with this number of seeds in the tissue.
     pub fn begin_needle(&mut self, number: usize, seeds: usize) {
-        self.keep();
+        self.to_keep = true;
         self.advance(|progress| progress.begin(number, seeds));
     }
 

@@ -2,6 +2,7 @@
 
 use super::Failure;
 use nalgebra::Vector3;
+use std::hash::{DefaultHasher, Hasher};
 use stylet_anatomy::PatientFrame;
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::anatomy::Body;
@@ -32,6 +33,8 @@ pub struct AnatomyOutlines {
     pub scene: SceneId,
     /// The template.
     pub template: Template,
+    /// Digest of labels and structures, the same in every run of the core.
+    pub body: u64,
     /// Surfaces of target and spared structures.
     pub anatomy: Anatomy,
     /// Transform between scene and patient.
@@ -44,8 +47,16 @@ pub struct AnatomyOutlines {
 
 impl AnatomyOutlines {
     pub(super) fn of(scene: &SceneModel, template: Template) -> Result<Self, Failure> {
-        let key = scene.header.id();
-        Ok(Self::on(Anatomy::of(scene)?, key, template))
+        let mut header = scene.header;
+        (header.session_id, header.generation) = (0, 0);
+        let mut body = DefaultHasher::new();
+        body.write(bytemuck::bytes_of(&header));
+        body.write(&scene.labels);
+        let body = body.finish();
+        Ok(Self {
+            body,
+            ..Self::on(Anatomy::of(scene)?, scene.header.id(), template)
+        })
     }
 
     fn on(anatomy: Anatomy, scene: SceneId, template: Template) -> Self {
@@ -75,6 +86,7 @@ impl AnatomyOutlines {
         Self {
             scene,
             template,
+            body: 0,
             frames: anatomy.patient,
             layers: (0..=count).map(layer).collect(),
             pieces_m: Hole::all().map(piece).collect(),

@@ -24,6 +24,8 @@ pub struct Planning {
     pub progress: NeedleProgress,
     /// Plans of the last search, to choose from.
     pub proposals: Option<Arc<Vec<FirstPlan>>>,
+    /// True if there is no plan, and a discarded one can be restored.
+    pub can_restore: bool,
     /// Drawing on the live picture, and the update of the plan based on it.
     pub review: ReviewShown,
 }

@@ -77,20 +77,82 @@ fn more_seeds_than_the_core_can_hold_are_refused() {
     assert_eq!(planner.plan(), Some(&planned()));
 }
 
-#[test]
-fn a_rehearsal_holds_until_its_needle_changes() {
-    let mut planner = planner();
-    let needle = planned().needles[0].clone();
-    let mut drops = Drops::as_planned(&needle);
+/// Returns a compensation that drops the first seed 2 mm deeper.
+fn deeper(needle: &Needle) -> Compensation {
+    let mut drops = Drops::as_planned(needle);
     drops.along_m[0] += 2e-3;
-    let done = Compensation {
+    Compensation {
         drops,
         before_m: None,
         after_m: vec![[0.0; 3]; 2],
         rehearsals: 1,
         for_edges: 0,
         sensitive: Vec::new(),
+    }
+}
+
+/// Returns everything that belongs to the plan.
+fn all_of(
+    planner: &Planner,
+) -> (
+    Option<History<ImplantPlan>>,
+    Vec<(Needle, Compensation)>,
+    NeedleProgress,
+) {
+    let parts = (&planner.history, &planner.compensated, &planner.planning.progress);
+    (parts.0.clone(), parts.1.clone(), parts.2.clone())
+}
+
+/// Creates a planner with an undone step, a rehearsal, and a needle that is done.
+fn inserting() -> Planner {
+    let mut planner = planner();
+    planner.edit(|plan| plan.with_needle_at(1, hole("J7")));
+    planner.undo();
+    let needle = planned().needles[1].clone();
+    planner.compensated.push((needle.clone(), deeper(&needle)));
+    planner.begin_needle(0, 0);
+    planner.finish_needle(2);
+    planner
+}
+
+#[test]
+fn a_discarded_plan_is_restored_as_it_was() {
+    let mut planner = inserting();
+    let before = all_of(&planner);
+    assert!(!planner.planning().can_restore);
+    planner.discard();
+    assert_eq!(planner.plan(), None);
+    assert!(planning(&mut planner).implant.is_none() && planner.planning().can_restore);
+    assert_eq!(planner.progress(), &NeedleProgress::default());
+    assert!(planner.restore());
+    assert_eq!(all_of(&planner), before);
+    assert!(!planner.restore(), "there is a plan");
+}
+
+#[test]
+fn a_plan_returns_with_its_scene_to_new_tissue() {
+    use bytemuck::Zeroable;
+    let scene = |name: &str| {
+        let mut header = stylet_shm_schema::SceneHeader::zeroed();
+        header.name = stylet_shm_schema::Text::new(name);
+        Arc::new(SceneModel::new(header, Vec::new(), Vec::new(), Vec::new()))
     };
+    let mut planner = inserting();
+    planner.of_scene = Some(("paper".to_owned(), [0.0; 3]));
+    let (history, compensated, _) = all_of(&planner);
+    planner.take_scene(&scene("pelvis"));
+    assert_eq!(planner.plan(), None);
+    assert!(planner.take_message().is_some_and(|note| !note.refused));
+    assert!(!planner.planning().can_restore, "of another scene");
+    planner.take_scene(&scene("paper"));
+    assert_eq!(all_of(&planner), (history, compensated, NeedleProgress::default()));
+}
+
+#[test]
+fn a_rehearsal_holds_until_its_needle_changes() {
+    let mut planner = planner();
+    let needle = planned().needles[0].clone();
+    let done = deeper(&needle);
     planner.compensated.push((needle, done));
     assert_eq!(planner.task(0).unwrap().drops.along_m[0], 0.082);
     planner.edit(|plan| plan.with_needle_at(1, hole("J7")));

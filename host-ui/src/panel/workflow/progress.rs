@@ -176,11 +176,13 @@ pub fn is_at_next_seed(shown: &Shown) -> bool {
     needle_at_hand(shown).is_some_and(|needle| needle.is_at_next_drop())
 }
 
-/// Returns the action of Ctrl+Z: it undoes the last seed, or else the plan while the needle is
-/// outside.
+/// Returns the action of Ctrl+Z: it restores a discarded plan, or undoes the last seed, or else the
+/// plan while the needle is outside.
 pub fn undo_action(shown: &Shown) -> Option<Undo> {
     if !shown.is_live() {
         None
+    } else if shown.planning.can_restore && shown.plan.is_none() {
+        Some(Undo::Discard)
     } else if !shown.own_seeds().is_empty() {
         Some(Undo::Seed)
     } else if shown.plan.is_some() && !shown.has_punctured() {
@@ -194,6 +196,8 @@ pub fn undo_action(shown: &Shown) -> Option<Undo> {
 pub enum Undo {
     Seed,
     Plan,
+    /// Restores the plan of many needles that was discarded.
+    Discard,
 }
 
 #[cfg(test)]

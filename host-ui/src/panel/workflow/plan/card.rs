@@ -44,6 +44,10 @@ fn begin_ui(ui: &mut egui::Ui, shown: &Shown, (ready, free): (bool, bool), actio
         let undo = Press("Withdraw the plan", "Ctrl+Z").ui(ui, ready && undo_action(shown) == Some(Undo::Plan));
         actions.extend(undo.then_some(Action::Undo));
     });
+    if shown.planning.can_restore {
+        let restore = Press("Restore the discarded plan", "As it was, with its rehearsals").ui(ui, free);
+        actions.extend(restore.then_some(Action::Plan(PlanAction::Restore)));
+    }
     ui.label(theme::small("Or many needles through the template:"));
     ui.horizontal(|ui| {
         automatic_ui(ui, shown, free, actions);
@@ -78,8 +82,13 @@ fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, a
         } else {
             super::next_needle_ui(ui, shown, actions);
         }
-        let discard = Press("Discard the plan", "Back to one needle; save it first to keep it").ui(ui, free);
-        actions.extend(discard.then_some(Action::Plan(PlanAction::Discard)));
+        // The path of a needle in the tissue is needed to take it out.
+        let outside = shown.is_in_tissue().then(|| "take the needle out first".to_owned());
+        let discard = ui.add_enabled(free && outside.is_none(), Button::new("Discard the plan"));
+        let hint = "Back to one needle; Ctrl+Z restores it";
+        if hinted(discard, outside).on_hover_text(hint).clicked() {
+            actions.push(Action::Plan(PlanAction::Discard));
+        }
     });
     ui.horizontal(|ui| {
         ui.add_enabled_ui(waits, |ui| automatic_ui(ui, shown, free, actions));

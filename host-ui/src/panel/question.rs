@@ -1,0 +1,129 @@
+//! Questions before what cannot be undone: removing what is in the tissue, and a run that would re-arm, because after a
+//! fault only a person turns the force on again.
+
+use crate::action::Action;
+use crate::shown::Shown;
+use crate::words::counted;
+use egui::{Key, Modal, Modifiers};
+use stylet_shm_schema::{Fault, Request};
+
+/// Starting point of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Begin {
+    /// The remaining drops in the tissue.
+    WhereItWas,
+    /// A reset.
+    Anew,
+}
+
+/// What waits for an answer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Question {
+    /// A run while a fault stands.
+    Rearm(Begin),
+    /// An action that removes what is in the tissue, with its name.
+    Remove(&'static str, Action),
+}
+
+impl Question {
+    /// Returns the question before this action; `None` if nothing in the tissue is lost by it.
+    pub fn before(action: &Action, shown: &Shown) -> Option<Self> {
+        let name = match action {
+            Action::Send(Request::Reset) => "Reset",
+            Action::StartOver => "Start over",
+            // The other runs continue with what is in the tissue.
+            Action::RunAll if shown.continues_at.is_none() => "Reset and run",
+            Action::LoadScene(_) | Action::LoadBuiltinScene(_) => "Load the scene",
+            _ => return None,
+        };
+        in_tissue(shown)?;
+        Some(Self::Remove(name, action.clone()))
+    }
+}
+
+/// Returns what a reset or another scene removes, such as "83 seeds".
+fn in_tissue(shown: &Shown) -> Option<String> {
+    match (shown.seeds.len(), shown.left.len()) {
+        (0, 0) => None,
+        (seeds, 0) => Some(counted(seeds, "seed")),
+        (0, left) => Some(format!("{} left in", counted(left, "needle"))),
+        (seeds, left) => Some(format!(
+            "{} and {} left in",
+            counted(seeds, "seed"),
+            counted(left, "needle")
+        )),
+    }
+}
+
+/// Draws the question; Y and N answer it too, and Esc cancels it.
+pub fn question_ui(ctx: &egui::Context, shown: &Shown, question: Option<&Question>) -> Option<Action> {
+    let (title, text, yes, no) = match question? {
+        Question::Rearm(_) => {
+            let fault = shown.stands_fault().unwrap_or(Fault::None);
+            let text = format!("A fault keeps the force off: {}.", fault.message());
+            (
+                "Re-arm and run?".to_owned(),
+                text,
+                "Re-arm and run (Y)".to_owned(),
+                "Leave the force off (N)",
+            )
+        }
+        Question::Remove(name, _) => {
+            let text = format!(
+                "This removes {} from the tissue, which cannot be undone. Plan and debrief are saved under out/ first.",
+                in_tissue(shown).unwrap_or_else(|| "nothing".to_owned())
+            );
+            (format!("{name}?"), text, format!("{name} (Y)"), "Keep the implant (N)")
+        }
+    };
+    let pressed = |key| ctx.input_mut(|i| i.consume_key(Modifiers::NONE, key));
+    let (agreed, refused) = (pressed(Key::Y), pressed(Key::N));
+    let modal = Modal::new(egui::Id::unique("question")).show(ctx, |ui| {
+        ui.set_max_width(380.0);
+        ui.heading(title);
+        ui.label(text);
+        ui.add_space(8.0);
+        ui.horizontal(|ui| {
+            let agreed = ui.button(yes).clicked();
+            let refused = ui.button(no).clicked();
+            (agreed, refused)
+        })
+        .inner
+    });
+    let (clicked, declined) = modal.inner;
+    let is_left = refused || declined || modal.backdrop_response.clicked();
+    (agreed || clicked || is_left).then_some(Action::Answer((agreed || clicked) && !is_left))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::{Event, RawInput};
+
+    #[test]
+    fn only_its_keys_answer_the_question() {
+        let answer = |key: Option<Key>, asks: Option<&Question>| {
+            let ctx = egui::Context::default();
+            let event = |key| Event::Key {
+                key,
+                physical_key: None,
+                pressed: true,
+                repeat: false,
+                modifiers: Modifiers::NONE,
+            };
+            let input = RawInput {
+                events: key.map(event).into_iter().collect(),
+                ..RawInput::default()
+            };
+            let mut action = None;
+            let _ = ctx.run_ui(input, |ui| action = question_ui(ui.ctx(), &Shown::empty("t"), asks));
+            action
+        };
+        let question = Question::Rearm(Begin::Anew);
+        let asks = Some(&question);
+        assert_eq!(answer(Some(Key::Y), asks), Some(Action::Answer(true)));
+        assert_eq!(answer(Some(Key::N), asks), Some(Action::Answer(false)));
+        assert_eq!(answer(Some(Key::Enter), asks), None);
+        assert_eq!(answer(Some(Key::Y), None), None);
+    }
+}
