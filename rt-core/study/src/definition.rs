@@ -1,18 +1,38 @@
-//! STUDY.toml: read strictly, with every problem at once.
+//! STUDY.toml: read strictly, with every problem of its values at once.
 
 use crate::corners;
 use crate::error::StudyError;
 use crate::plan::{self, Plan};
-use crate::problem::{GLAND_KEYS, GlandProblem, KEYS, LONGEST_NAME, QuantityProblem, StudyProblem};
+use crate::problem::{GlandProblem, LONGEST_NAME, MOST_IMPLANTS, QuantityProblem, StudyProblem};
 use crate::quantity::{self, QUANTITIES};
 use crate::spread::Spread;
+use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use std::path::Path;
 use stylet_shm_schema::{BUILTIN_SCENES, ParameterSpec, ProblemList};
 use stylet_sim::scene::TissueKind;
-use toml::{Table, Value};
+use toml::Table;
 
-const MOST_IMPLANTS: i64 = 1_000_000;
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StudyFile {
+    name: String,
+    seed: Option<u64>,
+    implants: u32,
+    tissue: Option<String>,
+    #[serde(default, rename = "gland")]
+    glands: Vec<GlandFile>,
+    #[serde(default)]
+    vary: Table,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct GlandFile {
+    scene: String,
+    /// File of the plan, relative to the study.
+    plan: String,
+}
 
 /// A study, validated.
 #[derive(Clone, Debug)]
@@ -66,28 +86,33 @@ impl Study {
 
     /// Reads a study as [`read`](Self::read) does; the plans are searched in `folder`.
     pub(crate) fn of_text(text: &str, folder: &Path) -> Result<Self, ProblemList<StudyProblem>> {
+        let file: StudyFile = toml::from_str(text).map_err(StudyProblem::Toml)?;
         let table: Table = text.parse().map_err(StudyProblem::Toml)?;
         let mut problems = Vec::new();
-        problems.extend(unknown(&table, &KEYS).map(StudyProblem::UnknownKey));
-        let name = name(&table, &mut problems);
-        let seed = whole(&table, "seed", [0, i64::MAX], Some(1), &mut problems) as u64;
-        let implants = whole(&table, "implants", [1, MOST_IMPLANTS], None, &mut problems) as u32;
-        let tissue = tissue(&table, &mut problems);
+        let is_of_id = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        if !(1..=LONGEST_NAME).contains(&file.name.len()) || !file.name.chars().all(is_of_id) {
+            problems.push(StudyProblem::Name(file.name.clone()));
+        }
+        if !(1..=MOST_IMPLANTS).contains(&file.implants) {
+            problems.push(StudyProblem::Implants(file.implants));
+        }
+        let tissue = tissue(file.tissue, &mut problems);
         let mut sum = Sha256::new();
         sum.update(env!("CARGO_PKG_VERSION"));
-        // Without comments, and in the order of the keys.
         sum.update(table.to_string());
-        let glands = glands(&table, folder, &mut sum, &mut problems);
-        let (quantities, parameters) = vary(&table, tissue, &mut problems);
-        // Each by itself first: a corner that is out of range would be reported twice.
+        if file.glands.is_empty() {
+            problems.push(StudyProblem::NoGland);
+        }
+        let glands = glands(&file.glands, folder, &mut sum, &mut problems);
+        let (quantities, parameters) = vary(&file.vary, tissue, &mut problems);
         if problems.is_empty() {
             problems.extend(corners::problem(&parameters, tissue));
         }
         ProblemList::check(problems)?;
         Ok(Self {
-            name,
-            seed,
-            implants,
+            name: file.name,
+            seed: file.seed.unwrap_or(1),
+            implants: file.implants,
             tissue,
             glands,
             quantities,
@@ -111,85 +136,25 @@ impl Study {
     }
 }
 
-fn unknown(table: &Table, known: &[&str]) -> impl Iterator<Item = String> {
-    table.keys().filter(|key| !known.contains(&key.as_str())).cloned()
-}
-
-fn name(table: &Table, problems: &mut Vec<StudyProblem>) -> String {
-    let fits = |name: &&str| {
-        let letters = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c));
-        letters && (1..=LONGEST_NAME).contains(&name.len())
-    };
-    match table.get("name").map(|name| name.as_str().filter(fits)) {
-        Some(Some(name)) => return name.to_owned(),
-        Some(None) => problems.push(StudyProblem::Name(table["name"].clone())),
-        None => problems.push(StudyProblem::NoName),
-    }
-    String::new()
-}
-
-fn whole(
-    table: &Table,
-    key: &'static str,
-    [least, most]: [i64; 2],
-    default: Option<i64>,
-    problems: &mut Vec<StudyProblem>,
-) -> i64 {
-    match (table.get(key), default) {
-        (None, Some(default)) => return default,
-        (None, None) => problems.push(StudyProblem::NoNumber { key, least, most }),
-        (Some(value), _) => match value.as_integer().filter(|n| (least..=most).contains(n)) {
-            Some(n) => return n,
-            None => problems.push(StudyProblem::Number {
-                key,
-                value: value.clone(),
-                least,
-                most,
-            }),
-        },
-    }
-    0
-}
-
-fn tissue(table: &Table, problems: &mut Vec<StudyProblem>) -> TissueKind {
-    let Some(value) = table.get("tissue") else {
+fn tissue(name: Option<String>, problems: &mut Vec<StudyProblem>) -> TissueKind {
+    let Some(name) = name else {
         return TissueKind::default();
     };
-    value.as_str().and_then(TissueKind::of_name).unwrap_or_else(|| {
-        problems.push(StudyProblem::Tissue(value.clone()));
+    TissueKind::of_name(&name).unwrap_or_else(|| {
+        problems.push(StudyProblem::Tissue(name));
         TissueKind::default()
     })
 }
 
-fn glands(table: &Table, folder: &Path, sum: &mut Sha256, problems: &mut Vec<StudyProblem>) -> Vec<Gland> {
-    let list = table
-        .get("gland")
-        .and_then(Value::as_array)
-        .filter(|list| !list.is_empty());
-    let Some(list) = list else {
-        problems.push(StudyProblem::NoGland);
-        return Vec::new();
-    };
+fn glands(list: &[GlandFile], folder: &Path, sum: &mut Sha256, problems: &mut Vec<StudyProblem>) -> Vec<Gland> {
     let mut glands: Vec<Gland> = Vec::new();
-    for (n, gland) in list.iter().enumerate() {
+    for (n, GlandFile { scene, plan }) in list.iter().enumerate() {
         let number = n + 1;
         let mut report = |problem| problems.push(StudyProblem::Gland { number, problem });
-        let Some(gland) = gland.as_table() else {
-            report(GlandProblem::NoTable);
-            continue;
-        };
-        unknown(gland, &GLAND_KEYS)
-            .map(GlandProblem::UnknownKey)
-            .for_each(&mut report);
-        let scene = gland.get("scene").and_then(Value::as_str).unwrap_or_default();
-        if !BUILTIN_SCENES.contains(&scene) {
-            report(GlandProblem::Scene(scene.to_owned()));
+        if !BUILTIN_SCENES.contains(&scene.as_str()) {
+            report(GlandProblem::Scene(scene.clone()));
         }
-        let Some(file) = gland.get("plan").and_then(Value::as_str) else {
-            report(GlandProblem::NoPlan);
-            continue;
-        };
-        let path = folder.join(file);
+        let path = folder.join(plan);
         let Some(plan) = read_plan(&path, sum, &mut report) else {
             continue;
         };
@@ -197,13 +162,15 @@ fn glands(table: &Table, folder: &Path, sum: &mut Sha256, problems: &mut Vec<Stu
             .file_stem()
             .map(|s| s.to_string_lossy().into_owned())
             .unwrap_or_default();
-        let same = |other: &&Gland| other.scene == scene && other.plan_name == stem;
-        if glands.iter().any(|other| same(&other)) {
-            let (scene, plan) = (scene.to_owned(), stem.clone());
+        if glands
+            .iter()
+            .any(|other| other.scene == *scene && other.plan_name == stem)
+        {
+            let (scene, plan) = (scene.clone(), stem.clone());
             report(GlandProblem::Twice { scene, plan });
         }
         glands.push(Gland {
-            scene: scene.to_owned(),
+            scene: scene.clone(),
             plan_name: stem,
             plan,
         });
@@ -233,18 +200,9 @@ fn read_plan(path: &Path, sum: &mut Sha256, report: &mut impl FnMut(GlandProblem
 
 type Spreads = (Vec<Spread>, Vec<(&'static ParameterSpec, Spread)>);
 
-fn vary(table: &Table, tissue: TissueKind, problems: &mut Vec<StudyProblem>) -> Spreads {
+fn vary(given: &Table, tissue: TissueKind, problems: &mut Vec<StudyProblem>) -> Spreads {
     let mut quantities: Vec<Spread> = QUANTITIES.iter().map(|q| Spread::Fixed(q.default)).collect();
     let mut parameters = Vec::new();
-    let empty = Table::new();
-    let given = match table.get("vary") {
-        None => &empty,
-        Some(Value::Table(given)) => given,
-        Some(other) => {
-            problems.push(StudyProblem::NoTable(other.clone()));
-            &empty
-        }
-    };
     for (key, value) in given {
         let mut report = |problem| {
             problems.push(StudyProblem::Quantity {

@@ -6,54 +6,27 @@ use crate::spread::SpreadProblem;
 use std::path::PathBuf;
 use stylet_shm_schema::{BUILTIN_SCENES, ParameterProblems};
 use stylet_sim::scene::TissueKind;
-use toml::Value;
 
-pub(crate) const KEYS: [&str; 6] = ["name", "seed", "implants", "tissue", "gland", "vary"];
-pub(crate) const GLAND_KEYS: [&str; 2] = ["scene", "plan"];
 pub(crate) const LONGEST_NAME: usize = 60;
+pub(crate) const MOST_IMPLANTS: u32 = 1_000_000;
 
 /// Problem of a study file.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyProblem {
-    /// Not TOML.
-    #[error("it is no TOML: {0}")]
+    /// Not the TOML of a study.
+    #[error("it is no study: {0}")]
     Toml(#[from] toml::de::Error),
-    /// A key that a study does not have.
-    #[error("{0}: there is no such key; there are {keys}", keys = KEYS.join(", "))]
-    UnknownKey(String),
-    /// No name.
-    #[error("name is missing: it begins the id of every insertion")]
-    NoName,
     /// A name that is no part of an id.
-    #[error("name is {0}; give 1 to {LONGEST_NAME} letters, digits, '-', '_' or '.'")]
-    Name(Value),
-    /// A number is missing.
-    #[error("{key} is missing: a whole number from {least} to {most}")]
-    NoNumber {
-        /// Its key.
-        key: &'static str,
-        /// Smallest value.
-        least: i64,
-        /// Largest value.
-        most: i64,
-    },
-    /// Not a whole number within its limits.
-    #[error("{key} is {value}; it must be a whole number from {least} to {most}")]
-    Number {
-        /// Its key.
-        key: &'static str,
-        /// Its value.
-        value: Value,
-        /// Smallest value.
-        least: i64,
-        /// Largest value.
-        most: i64,
-    },
+    #[error("name is \"{0}\"; give 1 to {LONGEST_NAME} letters, digits, '-', '_' or '.'")]
+    Name(String),
+    /// Too few or too many draws of each gland.
+    #[error("implants is {0}; it must be a whole number from 1 to {MOST_IMPLANTS}")]
+    Implants(u32),
     /// An unknown tissue model.
-    #[error("tissue is {0}; there are {names}", names = TissueKind::ALL.map(TissueKind::name).join(", "))]
-    Tissue(Value),
+    #[error("tissue is \"{0}\"; there are {names}", names = TissueKind::ALL.map(TissueKind::name).join(", "))]
+    Tissue(String),
     /// No gland.
-    #[error("gland is missing: give [[gland]] with scene and plan once or several times")]
+    #[error("there is no gland: give [[gland]] with scene and plan once or several times")]
     NoGland,
     /// Problem of a gland.
     #[error("gland {number}: {problem}")]
@@ -63,9 +36,6 @@ pub enum StudyProblem {
         /// Its problem.
         problem: GlandProblem,
     },
-    /// Not a table of quantities.
-    #[error("vary is {0}; it must be a table: [vary]")]
-    NoTable(Value),
     /// Problem of a quantity.
     #[error("vary.{key}: {problem}")]
     Quantity {
@@ -95,18 +65,9 @@ pub enum StudyProblem {
 /// Problem of a gland.
 #[derive(Debug, thiserror::Error)]
 pub enum GlandProblem {
-    /// Not a table.
-    #[error("it must be a table: [[gland]]")]
-    NoTable,
-    /// A key that a gland does not have.
-    #[error("{0}: there is no such key; there are {keys}", keys = GLAND_KEYS.join(", "))]
-    UnknownKey(String),
     /// An unknown scene.
     #[error("scene is \"{0}\"; there are {scenes}", scenes = BUILTIN_SCENES.join(", "))]
     Scene(String),
-    /// No plan.
-    #[error("plan is missing: a file of `host-ui plan`, relative to this one")]
-    NoPlan,
     /// The plan cannot be read.
     #[error("plan {}: it cannot be read ({why})", .path.display())]
     Unreadable {

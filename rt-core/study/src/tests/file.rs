@@ -21,13 +21,11 @@ fn every_problem_is_listed_with_what_there_is() {
     let folder = tempfile::tempdir().unwrap();
     let wrong = r#"
 name = "a b"
-sead = 1
 implants = 0
 tissue = "jelly"
 [[gland]]
 scene = "knee"
 plan = "plan.toml"
-hole = "G7"
 [[gland]]
 scene = "paper"
 plan = "no.toml"
@@ -43,11 +41,9 @@ entry_right_mm = { normal = [5.0, 1.0], within = [-1.0, 1.0] }
 "#;
     let problems = study_in(folder.path(), wrong).expect_err("it is wrong all over");
     let expected = [
-        "sead: there is no such key; there are name, seed, implants",
         "name is \"a b\"",
         "implants is 0; it must be a whole number from 1",
         "tissue is \"jelly\"; there are chainmail, fem, paper",
-        "gland 1: hole: there is no such key; there are scene, plan",
         "gland 1: scene is \"knee\"; there are paper, pelvis, full",
         "gland 2: plan ",
         "vary.speed: there is no such quantity; there are stiffness, hand_mass_kg",
@@ -67,6 +63,29 @@ entry_right_mm = { normal = [5.0, 1.0], within = [-1.0, 1.0] }
     }
     // Nothing else: the wrong file of a plan is one problem.
     assert_eq!(problems.len(), expected.len(), "{problems:#?}");
+}
+
+#[test]
+fn a_key_or_type_that_no_study_has_is_refused_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    for (wrong, expected) in [
+        (
+            text("implants = 1\nsead = 1"),
+            "unknown field `sead`, expected one of `name`, `seed`",
+        ),
+        (
+            text("implants = 1") + "hole = \"G7\"",
+            "unknown field `hole`, expected `scene` or `plan`",
+        ),
+        (text("implants = 1.5"), "expected u32"),
+        (text("implants = 1\nseed = -1"), "expected u64"),
+        (text("implants = 1\nvary = 3"), "expected a map"),
+        (text(""), "missing field `implants`"),
+        ("name = \"t\"\nimplants = 1".to_owned(), "there is no gland"),
+    ] {
+        let problems = study_in(folder.path(), &wrong).expect_err(expected);
+        assert!(problems.len() == 1 && problems[0].contains(expected), "{problems:#?}");
+    }
 }
 
 /// Thousands of insertions failed one by one where the file could have been refused.
