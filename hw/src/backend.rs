@@ -34,8 +34,6 @@ pub struct Backend {
     pub kind: BackendKind,
     /// Name in command lines and scene files. Stable, because scene files contain it.
     pub name: &'static str,
-    /// Older names, accepted on reading.
-    pub aliases: &'static [&'static str],
     /// Argument that may follow the name.
     pub argument: Argument,
     /// One line for help texts.
@@ -51,7 +49,6 @@ pub const BACKENDS: &[Backend] = &[
     Backend {
         kind: BackendKind::Simulated,
         name: "simulated",
-        aliases: &["sim"],
         argument: Argument::None,
         help: "a simulated Phantom Premium 1.5 in the grip of a simulated hand",
         simulated: true,
@@ -60,7 +57,6 @@ pub const BACKENDS: &[Backend] = &[
     Backend {
         kind: BackendKind::Phantom,
         name: "phantom",
-        aliases: &[],
         argument: Argument::Optional("NAME"),
         help: "a Phantom through OpenHaptics: the driver's default device, or the one called NAME",
         simulated: false,
@@ -69,7 +65,6 @@ pub const BACKENDS: &[Backend] = &[
     Backend {
         kind: BackendKind::Replay,
         name: "replay",
-        aliases: &[],
         argument: Argument::Required("FILE"),
         help: "a recorded motion (from 'host-ui export --motion')",
         simulated: true,
@@ -78,7 +73,6 @@ pub const BACKENDS: &[Backend] = &[
     Backend {
         kind: BackendKind::ForceDimension,
         name: "force-dimension",
-        aliases: &["drd"],
         argument: Argument::Optional("NUMBER"),
         help: "an omega, delta or sigma of Force Dimension, or a Falcon: the first one, or the one with this number, from 0",
         simulated: false,
@@ -87,7 +81,6 @@ pub const BACKENDS: &[Backend] = &[
     Backend {
         kind: BackendKind::Haply,
         name: "haply",
-        aliases: &["inverse3"],
         argument: Argument::Optional("NUMBER"),
         help: "an Inverse3 of Haply through its Inverse service: the first one, the one with this number, from 0, or with this id",
         simulated: false,
@@ -111,14 +104,11 @@ pub fn parse(text: &str) -> Result<(BackendKind, Option<&str>), UnknownBackend> 
     let (name, argument) = text
         .split_once(':')
         .map_or((text, None), |(name, argument)| (name, Some(argument)));
-    let found = BACKENDS
-        .iter()
-        .find(|b| b.name == name || b.aliases.contains(&name))
-        .filter(|b| match b.argument {
-            Argument::None => argument.is_none(),
-            Argument::Optional(_) => argument != Some(""),
-            Argument::Required(_) => argument.is_some_and(|a| !a.is_empty()),
-        });
+    let found = BACKENDS.iter().find(|b| b.name == name).filter(|b| match b.argument {
+        Argument::None => argument.is_none(),
+        Argument::Optional(_) => argument != Some(""),
+        Argument::Required(_) => argument.is_some_and(|a| !a.is_empty()),
+    });
     found
         .map(|b| (b.kind, argument))
         .ok_or_else(|| UnknownBackend(text.to_owned()))
@@ -158,27 +148,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_and_aliases_are_unique_and_parse() {
-        let mut names: Vec<_> = BACKENDS
-            .iter()
-            .flat_map(|b| b.aliases.iter().chain([&b.name]))
-            .collect();
+    fn names_are_unique_and_parse() {
+        let mut names: Vec<_> = BACKENDS.iter().map(|b| b.name).collect();
         names.sort_unstable();
         assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
         for b in BACKENDS {
             let argument = (b.argument != Argument::None).then_some("something");
             let suffix = argument.map_or(String::new(), |a| format!(":{a}"));
-            for name in b.aliases.iter().chain([&b.name]) {
-                assert_eq!(parse(&format!("{name}{suffix}")), Ok((b.kind, argument)));
-            }
+            assert_eq!(parse(&format!("{}{suffix}", b.name)), Ok((b.kind, argument)));
         }
-    }
-
-    /// Guards older scene files, which say `sim` where the force process accepted only `simulated`.
-    #[test]
-    fn sim_in_older_scene_files_means_simulated() {
-        assert_eq!(parse("sim"), Ok((BackendKind::Simulated, None)));
-        assert_eq!(parse("simulated"), Ok((BackendKind::Simulated, None)));
     }
 
     #[test]

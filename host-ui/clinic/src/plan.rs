@@ -131,7 +131,6 @@ enum Wanted {
     /// The one with the fewest needles
     FewerNeedles,
     /// The one with the smallest V150
-    #[value(alias = "cooler")]
     LowerV150,
 }
 

@@ -31,8 +31,6 @@ pub struct Class {
     pub attempts: Vec<Attempt>,
     /// Files that were left out, with reasons.
     pub left_out: Vec<String>,
-    /// Files that were read.
-    pub files: Vec<PathBuf>,
 }
 
 impl Class {
@@ -70,7 +68,6 @@ impl Class {
                     session: name(session),
                     ..attempt
                 });
-                self.files.push(file);
             }
             Err(why) => self.left_out.push(format!("{}: {why}", file.display())),
         }

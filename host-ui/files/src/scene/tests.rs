@@ -26,7 +26,7 @@ role = "leave out"
 [needle]
 insert_mm_per_s = 5
 [device]
-name = "sim"
+name = "simulated"
 [plan]
 file = "plan.dcm"
 "#;
@@ -47,7 +47,10 @@ fn structures_get_the_materials_of_the_file() {
     let scene = parse(FULL).unwrap();
     assert_eq!(scene.insert_m_per_s, Some(5e-3));
     assert_eq!(scene.image.as_deref(), Some(Path::new("trus.nii.gz")));
-    assert_eq!((scene.device.as_deref(), scene.retract_m_per_s), (Some("sim"), None));
+    assert_eq!(
+        (scene.device.as_deref(), scene.retract_m_per_s),
+        (Some("simulated"), None)
+    );
     let tissues = scene.tissues(&voxels()).unwrap();
     let names: Vec<(&str, Role)> = tissues.iter().map(|t| (t.name.as_str(), t.role)).collect();
     assert_eq!(names, [("Prostate", Role::Target), ("Rectum", Role::Spare)]);

@@ -238,11 +238,6 @@ mod tests {
             Ok(DeviceChoice { kind, argument })
         };
         assert_eq!("simulated".parse(), Ok(DeviceChoice::default()));
-        assert_eq!(
-            "sim".parse(),
-            Ok(DeviceChoice::default()),
-            "the name in older scene files"
-        );
         assert_eq!("phantom".parse(), choice(BackendKind::Phantom, None));
         assert_eq!(
             "phantom:Left arm".parse(),
