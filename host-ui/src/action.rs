@@ -108,7 +108,7 @@ pub enum TraineeAction {
 }
 
 /// Request of the operator for a recording.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum WatchAction {
     /// Shows the recorded insertion that comes with the program.
     Example,
@@ -116,8 +116,10 @@ pub enum WatchAction {
     File(PathBuf),
     /// Pauses or resumes it.
     Hold(bool),
-    /// Plays it again from its beginning.
-    Again,
+    /// Jumps to a position, s.
+    Jump(f64),
+    /// Plays it at this multiple of the recorded speed.
+    Speed(f64),
     /// Returns to the core.
     Close,
 }

@@ -21,7 +21,7 @@ use stylet_shm_schema::Instance;
 use stylet_shm_schema::*;
 use thread::Receiver;
 
-pub use player::{Piece, Playback, Played};
+pub use player::{Piece, Playback, Played, TimeMark};
 pub use received::{Answer, LinkError, LinkStatus, SceneModel, Snapshot};
 
 /// Longest pause of the heartbeat.

@@ -13,6 +13,9 @@ use stylet_host::record::{self, RecordError, ShowError};
 
 /// Insertion of one needle through the gland of `paper`, recorded by `make example`.
 pub(super) const EXAMPLE: &[u8] = include_bytes!("../../example/insertion.mcap");
+const EXAMPLE_NAME: &str = "Example";
+/// Speed of the example, whose insertion takes four seconds.
+const EXAMPLE_SPEED: f64 = 0.25;
 
 /// Reading of a recording; the text of an error follows the name of the file.
 type Read = Job<Result<Played, WatchError>>;
@@ -63,7 +66,7 @@ impl Recording {
         let job = Job::begin("example", |answer, interrupt| {
             let _ = answer.send(record::played_of(EXAMPLE, interrupt).map_err(WatchError::from));
         });
-        self.reading = Some(("Example".to_owned(), job));
+        self.reading = Some((EXAMPLE_NAME.to_owned(), job));
     }
 }
 
@@ -86,7 +89,8 @@ impl App {
             WatchAction::Example => self.recording.read_example(),
             WatchAction::File(path) => self.recording.read(&path),
             WatchAction::Hold(held) => self.link.playback().into_iter().for_each(|p| p.hold(held)),
-            WatchAction::Again => self.link.playback().into_iter().for_each(|p| p.again()),
+            WatchAction::Jump(to_s) => self.link.playback().into_iter().for_each(|p| p.jump(to_s)),
+            WatchAction::Speed(speed) => self.link.playback().into_iter().for_each(|p| p.play_at(speed)),
             WatchAction::Close => self.close_recording(),
         }
     }
@@ -113,6 +117,9 @@ impl App {
         let cut_off = |why: &String| Note::done(format!("{name} is shown up to its first error: {why}"));
         self.shown.note = played.cut_off.as_ref().map(cut_off);
         self.change_link(|instance| Link::playing(instance, Arc::new(played)));
+        if name == EXAMPLE_NAME {
+            self.link.playback().into_iter().for_each(|p| p.play_at(EXAMPLE_SPEED));
+        }
         self.recording.name = name;
         let planner = std::mem::take(&mut self.planner);
         self.recording.planner.get_or_insert(planner);
@@ -144,6 +151,8 @@ impl App {
             at_s: playback.at_s(),
             length_s: playback.length_s(),
             is_held: playback.is_held(),
+            speed: playback.speed(),
+            marks: playback.marks(),
             has_ended: playback.has_ended(),
         });
     }

@@ -1,5 +1,8 @@
 //! Parts of the state that a frame shows.
 
+use std::sync::Arc;
+use stylet_host::link::TimeMark;
+
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum LoadState {
     #[default]
@@ -42,11 +45,14 @@ pub struct FrameCost {
 }
 
 /// Recording that replaces a core.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Watched {
     pub name: String,
     pub at_s: f64,
     pub length_s: f64,
     pub is_held: bool,
+    /// Multiple of the recorded speed.
+    pub speed: f64,
+    pub marks: Arc<[TimeMark]>,
     pub has_ended: bool,
 }

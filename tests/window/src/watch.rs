@@ -47,7 +47,7 @@ fn the_example_opens_with_one_click_without_a_core_and_shows_an_insertion() {
     }
     assert_eq!(depth(&window), before, "it went on");
     window.get_by_label_contains("This is a recording");
-    window.get_by_label("Resume").click();
+    window.get_by_label("Play").click();
     until(&mut window, "the debrief", |window| {
         window.query_by_label("Seed error, mm").is_some() && window.query_by_label("Again").is_some()
     });

@@ -7,7 +7,9 @@ use super::{SceneModel, Snapshot};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord};
+use stylet_shm_schema::{
+    Event, EventKind, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord,
+};
 
 const PASS: Duration = Duration::from_millis(4);
 /// Interval of the heartbeat, without which the host would consider the core silent while the recording is paused.
@@ -50,20 +52,47 @@ impl Played {
     }
 }
 
+/// Event of a recording on its time line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimeMark {
+    /// Position, s.
+    pub at_s: f64,
+    /// Kind of the event.
+    pub kind: EventKind,
+}
+
+/// No other position is asked for.
+const NONE: u64 = u64::MAX;
+
 /// The host's control of a played recording.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub struct Playback {
     held: Arc<AtomicBool>,
-    again: Arc<AtomicBool>,
+    /// Position to which the host jumps, ns.
+    asked_ns: Arc<AtomicU64>,
+    /// Speed in thousandths of that of the recording.
+    speed: Arc<AtomicU64>,
     at_ns: Arc<AtomicU64>,
     length_ns: u64,
+    marks: Arc<[TimeMark]>,
 }
 
 impl Playback {
     pub(super) fn of(played: &Played) -> Self {
+        let mark = |(time_ns, piece): &(u64, Piece)| match piece {
+            Piece::Event(event) => Some(TimeMark {
+                at_s: *time_ns as f64 * 1e-9,
+                kind: EventKind::from_number(event.kind)?,
+            }),
+            _ => None,
+        };
         Self {
+            held: Arc::default(),
+            asked_ns: Arc::new(AtomicU64::new(NONE)),
+            speed: Arc::new(AtomicU64::new(1000)),
+            at_ns: Arc::default(),
             length_ns: played.length_ns(),
-            ..Self::default()
+            marks: played.pieces.iter().filter_map(mark).collect(),
         }
     }
 
@@ -73,11 +102,28 @@ impl Playback {
         self.held.store(held, Ordering::Relaxed);
     }
 
-    /// Restarts from the beginning.
-    pub fn again(&self) {
+    /// Jumps to a position, s.
+    pub fn jump(&self, to_s: f64) {
+        let to_ns = (to_s.max(0.0) * 1e9) as u64;
         // SYNC: taken by `Player::pass`.
-        self.again.store(true, Ordering::Relaxed);
-        self.hold(false);
+        self.asked_ns.store(to_ns.min(self.length_ns), Ordering::Relaxed);
+    }
+
+    /// Plays at this multiple of the recorded speed.
+    pub fn play_at(&self, speed: f64) {
+        // SYNC: read by `Player::pass`.
+        self.speed.store((speed * 1e3) as u64, Ordering::Relaxed);
+    }
+
+    /// Multiple of the recorded speed.
+    pub fn speed(&self) -> f64 {
+        // SYNC: stored by `play_at`.
+        self.speed.load(Ordering::Relaxed) as f64 * 1e-3
+    }
+
+    /// Events in their order.
+    pub fn marks(&self) -> Arc<[TimeMark]> {
+        self.marks.clone()
     }
 
     /// True while paused.
@@ -145,11 +191,16 @@ impl Player {
     /// Plays the messages that are due, and returns the time to wait.
     pub fn pass(&mut self) -> Duration {
         let now = Instant::now();
-        // SYNC: set by `Playback::again`.
-        if self.playback.again.swap(false, Ordering::Relaxed) {
-            self.begin();
+        // SYNC: set by `Playback::jump`.
+        let asked_ns = self.playback.asked_ns.swap(NONE, Ordering::Relaxed);
+        if asked_ns != NONE {
+            let asked = Duration::from_nanos(asked_ns);
+            if asked < self.at {
+                self.begin();
+            }
+            self.at = asked;
         } else if !self.playback.is_held() {
-            self.at += now - self.looked;
+            self.at += (now - self.looked).mul_f64(self.playback.speed());
         }
         self.looked = now;
         let length = Duration::from_nanos(self.played.length_ns());
@@ -157,7 +208,7 @@ impl Player {
         // SYNC: read by `Playback::at_s` and `has_ended`.
         self.playback.at_ns.store(self.at.as_nanos() as u64, Ordering::Relaxed);
         let inbox = &mut *lock(&self.inbox);
-        let is_moving = self.next < self.played.pieces.len() && !self.playback.is_held();
+        let is_moving = self.next < self.played.pieces.len() && (asked_ns != NONE || !self.playback.is_held());
         while let Some((_, piece)) = self
             .played
             .pieces

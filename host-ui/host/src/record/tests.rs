@@ -256,7 +256,26 @@ fn a_recording_is_played_as_a_core_speaks() {
     assert_eq!(refused, LinkError::Playback);
     let playback = link.playback().expect("a recording").clone();
     assert!(playback.has_ended() && (playback.length_s() - 0.019).abs() < 1e-9);
-    playback.again();
+    // Paused, it shows the tick of another time, and no later one.
+    playback.hold(true);
+    playback.jump(0.012);
+    let begun = Instant::now();
+    while link.state().is_none_or(|state| state.tick != 22) {
+        assert!(
+            begun.elapsed() < Duration::from_secs(10),
+            "{:?}",
+            link.state().map(|s| s.tick)
+        );
+        link.poll();
+        std::thread::sleep(POLL_EVERY);
+    }
+    std::thread::sleep(20 * POLL_EVERY);
+    link.poll();
+    assert_eq!(link.state().map(|state| state.tick), Some(22));
+    link.take_records();
+    playback.jump(0.0);
+    playback.play_at(0.5);
+    playback.hold(false);
     all(&mut link);
     assert_ne!(
         link.session().map(|session| session.session_id),

@@ -11,9 +11,9 @@ use crate::settings::Layout;
 use crate::shown::{LoadState, Note, Shown, Watched};
 use crate::view::state::Tool;
 use bytemuck::Zeroable;
-use stylet_host::link::LinkStatus;
+use stylet_host::link::{LinkStatus, TimeMark};
 use stylet_procedure::{Step, Waiting, WaitsFor};
-use stylet_shm_schema::{Fault, SecondState, Text, TickRecord, flags};
+use stylet_shm_schema::{EventKind, Fault, SecondState, Text, TickRecord, flags};
 use stylet_shm_schema::{LeftNeedlePose, MAX_LEFT_NEEDLES};
 
 pub type State = (&'static str, fn(&mut App));
@@ -217,6 +217,10 @@ fn recorded(app: &mut App, shown: Shown, has_ended: bool) {
         length_s: 1234.5,
         is_held: !has_ended,
         has_ended,
+        speed: 0.25,
+        marks: [EventKind::Puncture, EventKind::SeedDropped, EventKind::FaultRaised]
+            .map(|kind| TimeMark { at_s: 100.0, kind })
+            .into(),
     });
 }
 

@@ -4,8 +4,9 @@ use super::{Guide, Progress, hinted, missing};
 use crate::action::{Action, WatchAction};
 use crate::shown::{Shown, Watched};
 use crate::theme;
-use egui::{Align, Button, Layout};
+use egui::{Align, Button, Layout, Stroke};
 use stylet_implant::workflow::Step;
+use stylet_shm_schema::EventKind;
 
 /// Steps that the script takes for a plan of one needle, by their numbers in the panel.
 pub const SCRIPTED_STEPS: &str = "steps 2 to 6";
@@ -63,20 +64,35 @@ fn running_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     ui.add(egui::Label::new(theme::weak(text)).truncate());
 }
 
-/// Draws a recording: its progress, and its end.
+/// Speeds of a recording.
+const SPEEDS: [f64; 5] = [0.1, 0.25, 0.5, 1.0, 2.0];
+
+/// Draws a recording: its controls, and its time line.
 fn watched_ui(ui: &mut egui::Ui, watched: &Watched, actions: &mut Vec<Action>) {
     let mut asked = |action| actions.push(Action::Watch(action));
     ui.horizontal(|ui| {
         ui.set_min_height(RUN_BUTTON);
-        let (name, action) = match (watched.has_ended, watched.is_held) {
-            (true, _) => ("Again", WatchAction::Again),
-            (false, true) => ("Resume", WatchAction::Hold(false)),
-            (false, false) => ("Pause", WatchAction::Hold(true)),
-        };
-        if ui.button(name).clicked() {
-            asked(action);
+        let play = if watched.is_held { "Play" } else { "Pause" };
+        let name = if watched.has_ended { "Again" } else { play };
+        if ui.add(Button::new(name).min_size(egui::vec2(46.0, 0.0))).clicked() {
+            if watched.has_ended {
+                asked(WatchAction::Jump(0.0));
+            }
+            asked(WatchAction::Hold(!watched.has_ended && !watched.is_held));
         }
-        ui.label(format!("{:.0} of {:.0} s", watched.at_s.floor(), watched.length_s));
+        let speeds = egui::ComboBox::from_id_salt("speed").width(44.0);
+        let speeds = speeds.selected_text(format!("{}\u{d7}", watched.speed));
+        let speeds = speeds.show_ui(ui, |ui| {
+            for speed in SPEEDS {
+                let is_chosen = watched.speed == speed;
+                if ui.selectable_label(is_chosen, format!("{speed}\u{d7}")).clicked() {
+                    asked(WatchAction::Speed(speed));
+                }
+            }
+        });
+        theme::named(&speeds.response, egui::accesskit::Role::ComboBox, || "Speed");
+        let text = theme::small(format!("{:.1} of {:.1} s", watched.at_s, watched.length_s));
+        ui.label(text).on_hover_text(&watched.name);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let close = ui
                 .button("Close")
@@ -86,9 +102,50 @@ fn watched_ui(ui: &mut egui::Ui, watched: &Watched, actions: &mut Vec<Action>) {
             }
         });
     });
-    let text = format!("Recording: {}", watched.name);
-    ui.add(egui::Label::new(theme::weak(&text)).truncate())
-        .on_hover_text(&watched.name);
+    time_line_ui(ui, watched, actions);
+}
+
+/// Draws the time line with its marks; a click or drag jumps to its place.
+fn time_line_ui(ui: &mut egui::Ui, watched: &Watched, actions: &mut Vec<Action>) {
+    const HEIGHT: f32 = 22.0;
+    const REACH: f32 = 5.0;
+    let tokens = theme::of(ui);
+    let (rect, response) =
+        ui.allocate_exact_size(egui::vec2(ui.available_width(), HEIGHT), egui::Sense::click_and_drag());
+    theme::named(&response, egui::accesskit::Role::Slider, || "Time line");
+    let line = rect.shrink2(egui::vec2(6.0, 0.0));
+    let length_s = watched.length_s.max(1e-9);
+    let x_of = |at_s: f64| line.left() + line.width() * (at_s / length_s).clamp(0.0, 1.0) as f32;
+    let painter = ui.painter();
+    painter.hline(line.x_range(), line.center().y, Stroke::new(2.0, tokens.line));
+    painter.hline(
+        line.left()..=x_of(watched.at_s),
+        line.center().y,
+        Stroke::new(2.0, tokens.accent),
+    );
+    let mut under = None;
+    let pointer = response.hover_pos();
+    for mark in watched.marks.iter() {
+        // Shapes differ as well as colours.
+        let (name, color, [up, down]) = match mark.kind {
+            EventKind::Puncture => ("puncture", tokens.force, [9.0, 0.0]),
+            EventKind::SeedDropped => ("seed dropped", tokens.good, [0.0, 9.0]),
+            EventKind::FaultRaised | EventKind::SecondFaultRaised => ("fault", tokens.bad, [10.0, 10.0]),
+            EventKind::Mark => ("mark", tokens.accent, [5.0, 5.0]),
+            _ => continue,
+        };
+        let (x, y) = (x_of(mark.at_s), line.center().y);
+        painter.vline(x, y - up..=y + down, Stroke::new(2.0, color));
+        if pointer.is_some_and(|place| (place.x - x).abs() < REACH) {
+            under = Some(format!("{name}, {:.1} s", mark.at_s));
+        }
+    }
+    painter.circle_filled(egui::pos2(x_of(watched.at_s), line.center().y), 5.0, tokens.text);
+    if let Some(place) = response.interact_pointer_pos() {
+        let share = f64::from((place.x - line.left()) / line.width().max(1.0));
+        actions.push(Action::Watch(WatchAction::Jump(share.clamp(0.0, 1.0) * length_s)));
+    }
+    response.on_hover_text(under.unwrap_or_else(|| "Click for another time".to_owned()));
 }
 
 fn begin_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
