@@ -49,6 +49,16 @@ pub enum DoseOf {
     Plan,
 }
 
+impl DoseOf {
+    /// Returns whose dose it is, in a word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tissue => "delivered",
+            Self::Plan => "planned",
+        }
+    }
+}
+
 /// Seeds whose dose is requested.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DoseRequest {

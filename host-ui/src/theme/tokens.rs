@@ -29,6 +29,9 @@ pub struct Tokens {
     /// Colours of the three-dimensional picture.
     pub gland: Color32,
     pub body: Color32,
+    pub urethra: Color32,
+    pub rectum: Color32,
+    pub bladder: Color32,
     pub spared: Color32,
     pub bone: Color32,
     pub ghost: Color32,
@@ -65,7 +68,10 @@ pub const DARK: Tokens = Tokens {
     work: Color32::from_rgb(214, 140, 182),
     gland: Color32::from_rgb(196, 142, 132),
     body: Color32::from_rgb(150, 150, 140),
-    spared: Color32::from_rgb(204, 121, 167),
+    urethra: Color32::from_rgb(200, 235, 60),
+    rectum: Color32::from_rgb(205, 95, 30),
+    bladder: Color32::from_rgb(110, 120, 255),
+    spared: Color32::from_rgb(150, 115, 165),
     bone: Color32::from_rgb(222, 212, 180),
     ghost: Color32::from_rgb(120, 140, 165),
     needle: Color32::from_rgb(214, 221, 228),
@@ -99,10 +105,13 @@ pub const LIGHT: Tokens = Tokens {
     depth: Color32::from_rgb(0, 92, 148),
     wake: Color32::from_rgb(0, 105, 82),
     work: Color32::from_rgb(146, 52, 104),
-    gland: Color32::from_rgb(190, 118, 106),
+    gland: Color32::from_rgb(178, 74, 72),
     body: Color32::from_rgb(128, 128, 118),
-    spared: Color32::from_rgb(178, 84, 136),
-    bone: Color32::from_rgb(170, 152, 104),
+    urethra: Color32::from_rgb(70, 140, 0),
+    rectum: Color32::from_rgb(96, 32, 0),
+    bladder: Color32::from_rgb(60, 60, 210),
+    spared: Color32::from_rgb(150, 100, 170),
+    bone: Color32::from_rgb(156, 156, 132),
     ghost: Color32::from_rgb(84, 104, 130),
     needle: Color32::from_rgb(120, 130, 140),
     needle_tip: Color32::from_rgb(60, 66, 74),
@@ -124,6 +133,9 @@ pub struct ImageTokens {
     pub crosshair: Color32,
     pub needle: Color32,
     pub gland: Color32,
+    pub urethra: Color32,
+    pub rectum: Color32,
+    pub bladder: Color32,
     pub spared: Color32,
     pub bone: Color32,
     pub seed_placed: Color32,
@@ -143,9 +155,12 @@ pub const IMAGE: ImageTokens = ImageTokens {
     text: Color32::from_rgb(226, 232, 238),
     crosshair: Color32::from_rgb(118, 134, 150),
     needle: Color32::from_rgb(255, 255, 255),
-    gland: Color32::from_rgb(232, 160, 148),
-    spared: Color32::from_rgb(222, 148, 190),
-    bone: Color32::from_rgb(222, 212, 180),
+    gland: Color32::from_rgb(232, 150, 138),
+    urethra: Color32::from_rgb(200, 235, 60),
+    rectum: Color32::from_rgb(205, 95, 30),
+    bladder: Color32::from_rgb(110, 120, 255),
+    spared: Color32::from_rgb(170, 125, 180),
+    bone: Color32::from_rgb(238, 234, 214),
     seed_placed: Color32::from_rgb(240, 228, 66),
     seed_planned: Color32::from_rgb(86, 180, 233),
     isodose: [
@@ -163,8 +178,8 @@ pub const IMAGE: ImageTokens = ImageTokens {
 mod tests {
     use super::*;
 
-    /// Returns the relative luminance (WCAG 2.2).
-    fn luminance(color: Color32) -> f64 {
+    /// Returns red, green and blue of sRGB in proportion to light.
+    fn linear(color: Color32) -> [f64; 3] {
         let [r, g, b, _] = color.to_array().map(|byte| {
             let v = f64::from(byte) / 255.0;
             if v <= 0.04045 {
@@ -173,6 +188,12 @@ mod tests {
                 ((v + 0.055) / 1.055).powf(2.4)
             }
         });
+        [r, g, b]
+    }
+
+    /// Returns the relative luminance (WCAG 2.2).
+    fn luminance(color: Color32) -> f64 {
+        let [r, g, b] = linear(color);
         0.2126 * r + 0.7152 * g + 0.0722 * b
     }
 
@@ -221,6 +242,9 @@ mod tests {
             i.text,
             i.needle,
             i.gland,
+            i.urethra,
+            i.rectum,
+            i.bladder,
             i.spared,
             i.bone,
             i.seed_placed,
@@ -231,6 +255,79 @@ mod tests {
         ];
         for ink in lines.into_iter().chain(i.isodose) {
             assert!(contrast(ink, i.background) >= 4.5, "{ink:?}");
+        }
+    }
+
+    type Matrix = [[f64; 3]; 3];
+
+    /// Normal sight, deuteranopia and protanopia in linear sRGB (Machado, Oliveira and Fernandes
+    /// 2009, table 1 at severity 1).
+    const SIGHTS: [(&str, Matrix); 3] = [
+        ("normal", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+        (
+            "deuteranopia",
+            [
+                [0.367_322, 0.860_646, -0.227_968],
+                [0.280_085, 0.672_501, 0.047_413],
+                [-0.011_820, 0.042_940, 0.968_881],
+            ],
+        ),
+        (
+            "protanopia",
+            [
+                [0.152_286, 1.052_583, -0.204_868],
+                [0.114_503, 0.786_281, 0.099_216],
+                [-0.003_882, -0.048_116, 1.051_998],
+            ],
+        ),
+    ];
+
+    fn times(matrix: &Matrix, v: [f64; 3]) -> [f64; 3] {
+        matrix.map(|row| row.iter().zip(v).map(|(a, b)| a * b).sum())
+    }
+
+    /// Returns L*, a*, b* (CIE 1976, D65) as this sight sees the colour.
+    fn lab(color: Color32, sight: &Matrix) -> [f64; 3] {
+        let seen = times(sight, linear(color)).map(|c| c.clamp(0.0, 1.0));
+        let to_xyz = [
+            [0.4124, 0.3576, 0.1805],
+            [0.2126, 0.7152, 0.0722],
+            [0.0193, 0.1192, 0.9505],
+        ];
+        let [x, y, z] = times(&to_xyz, seen);
+        let f = |t: f64| {
+            if t > 0.008_856 {
+                t.cbrt()
+            } else {
+                7.787 * t + 16.0 / 116.0
+            }
+        };
+        let [x, y, z] = [f(x / 0.950_47), f(y), f(z / 1.088_83)];
+        [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+    }
+
+    /// Guards against urethra, rectum and bladder in one pink.
+    #[test]
+    fn structures_differ_for_every_sight() {
+        const LEAST: f64 = 18.0;
+        let (d, l, i) = (&DARK, &LIGHT, &IMAGE);
+        for (place, colors) in [
+            ("dark", [d.gland, d.urethra, d.rectum, d.bladder, d.spared, d.bone]),
+            ("light", [l.gland, l.urethra, l.rectum, l.bladder, l.spared, l.bone]),
+            ("image", [i.gland, i.urethra, i.rectum, i.bladder, i.spared, i.bone]),
+        ] {
+            for (sight, matrix) in &SIGHTS {
+                for (n, one) in colors.iter().enumerate() {
+                    for other in &colors[n + 1..] {
+                        let [a, b] = [one, other].map(|color| lab(*color, matrix));
+                        let apart = (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt();
+                        assert!(
+                            apart > LEAST,
+                            "{place}, {sight}: {one:?} and {other:?} are {apart:.1} apart"
+                        );
+                    }
+                }
+            }
         }
     }
 }

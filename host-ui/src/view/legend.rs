@@ -133,16 +133,9 @@ impl Legend<'_> {
         };
         let t = self.tokens;
         if let Some(scene) = &self.shown.scene {
-            list("gland", t.gland, true);
-            let others: Vec<Kind> = kinds(Some(scene)).collect();
-            for (kind, name) in [
-                (Kind::Spared, "to be spared"),
-                (Kind::Bone, "bone"),
-                (Kind::Body, "body"),
-            ] {
-                if others.contains(&kind) {
-                    list(name, kind.color(t), true);
-                }
+            let drawn: Vec<Kind> = kinds(Some(scene)).collect();
+            for kind in Kind::ALL.into_iter().filter(|kind| drawn.contains(kind)) {
+                list(kind.name(), kind.color(t), true);
             }
         }
         if look.rest_shape {
@@ -155,7 +148,8 @@ impl Legend<'_> {
             list("placed seed", t.seed_placed, true);
         }
         for shell in dose.iter().flat_map(|d| &d.shells).filter(|s| !s.points_m.is_empty()) {
-            let text = format!("{:.0} % isodose", LEVELS[shell.level] * 100.0);
+            let of = dose.map_or("", |dose| dose.of.name());
+            let text = format!("{:.0} % isodose, {of}", LEVELS[shell.level] * 100.0);
             list(&text, IMAGE.isodose[shell.level], true);
         }
         if rows.len() as f32 * ROW > MOST_SHARE * self.rect.height() {
@@ -216,7 +210,7 @@ mod tests {
         let mut plan = PlanInForce::zeroed();
         plan.entry_m = [0.03, 0.03, -0.02];
         shown.plan = Some(plan);
-        let names = ["gland", "to be spared", "bone", "body", "planned seed", "placed seed"];
+        let names = ["gland", "urethra", "bone", "body", "planned seed", "placed seed"];
         let rows = names.map(|name| Row {
             name: name.to_owned(),
             color: Color32::WHITE,

@@ -210,7 +210,7 @@ impl Slices {
             shown,
             view,
         };
-        overlay.draw(&self.lines[number], dose.is_some(), shift_m);
+        overlay.draw(&self.lines[number], dose.map(|dose| dose.of), shift_m);
         if let Some(place) = response.hover_pos() {
             overlay.tissue(&tissue_at(body, plane.in_scene(place)));
         }
@@ -293,11 +293,7 @@ fn contours(header: &SceneHeader, bodies: &Bodies) -> Vec<Contour> {
     let looked_at = all.filter(|(kind, _)| *kind != Kind::Body);
     looked_at
         .map(|(kind, part)| Contour {
-            color: match kind {
-                Kind::Gland => IMAGE.gland,
-                Kind::Bone => IMAGE.bone,
-                Kind::Spared | Kind::Body => IMAGE.spared,
-            },
+            color: kind.image_color(),
             triangles: bodies.triangles.get(part.clone()).unwrap_or(&[]).to_vec(),
         })
         .collect()

@@ -2,7 +2,7 @@
 
 use super::Contour;
 use super::plane::Plane;
-use crate::dose_worker::{DoseResult, LEVELS};
+use crate::dose_worker::{DoseOf, DoseResult, LEVELS};
 use crate::shown::Shown;
 use crate::theme::IMAGE;
 use crate::view::free::free_of_banners;
@@ -20,8 +20,10 @@ const IN_PLANE_M: f64 = 1.5e-3;
 /// Half a seed: distance beyond which the plane does not cut it.
 const SEED_HALF_M: f64 = 2.25e-3;
 const NEEDLE_M: f64 = 0.12;
-/// Drawn and blank points of an isodose line; a line without blanks is solid.
-const DASHES: [[f32; 2]; 4] = [[2.0, 3.0], [1.0, 0.0], [8.0, 3.0], [3.0, 2.0]];
+/// Drawn and blank points of an isodose line; outlines of structures are solid and wider.
+const DASHES: [[f32; 2]; 4] = [[2.0, 3.0], [14.0, 2.0], [8.0, 3.0], [3.0, 2.0]];
+const OUTLINE: f32 = 2.0;
+const ISODOSE: f32 = 1.3;
 
 /// Lines of one slice, cut again only when the plane or the surfaces have changed.
 #[derive(Default)]
@@ -116,9 +118,9 @@ pub struct Overlay<'a> {
 
 impl Overlay<'_> {
     /// Draws the overlay. `shift_m` leads from the scene's body to the dose.
-    pub fn draw(&self, lines: &Lines, with_dose: bool, shift_m: [f64; 3]) {
+    pub fn draw(&self, lines: &Lines, dose_of: Option<DoseOf>, shift_m: [f64; 3]) {
         for (color, line) in &lines.contours {
-            let stroke = Stroke::new(1.3, color.gamma_multiply(0.9));
+            let stroke = Stroke::new(OUTLINE, *color);
             self.painter.add(Shape::line(self.points(line, [0.0; 3]), stroke));
         }
         for (level, line) in &lines.isodoses {
@@ -132,8 +134,8 @@ impl Overlay<'_> {
         self.letters();
         self.scale_bar();
         let has_room = self.plane.rect.height() >= ROOM_FOR_LEGEND;
-        if with_dose && has_room && self.orientation == Orientation::Axial {
-            self.isodose_legend();
+        if let (Some(of), true, Orientation::Axial) = (dose_of, has_room, self.orientation) {
+            self.isodose_legend(of.name());
         }
     }
 
@@ -144,17 +146,9 @@ impl Overlay<'_> {
     }
 
     fn isodose(&self, level: usize, line: &cut::Line, shift_m: [f64; 3]) {
-        let (stroke, [dash, gap]) = (Stroke::new(1.4, IMAGE.isodose[level]), DASHES[level]);
-        self.dashed(self.points(line, shift_m), stroke, [dash, gap]);
-    }
-
-    /// Draws a line; one without gaps is solid.
-    fn dashed(&self, points: Vec<Pos2>, stroke: Stroke, [dash, gap]: [f32; 2]) {
-        if gap > 0.0 {
-            self.painter.extend(Shape::dashed_line(&points, stroke, dash, gap));
-        } else {
-            self.painter.add(Shape::line(points, stroke));
-        }
+        let (stroke, [dash, gap]) = (Stroke::new(ISODOSE, IMAGE.isodose[level]), DASHES[level]);
+        let points = self.points(line, shift_m);
+        self.painter.extend(Shape::dashed_line(&points, stroke, dash, gap));
     }
 
     /// Draws the other two slices as lines, open in the middle so that they hide nothing.
@@ -368,7 +362,7 @@ impl Overlay<'_> {
         );
     }
 
-    fn isodose_legend(&self) {
+    fn isodose_legend(&self, of: &str) {
         let mut at = self.plane.rect.left_bottom() + Vec2::new(10.0, -10.0);
         for level in (0..LEVELS.len()).rev() {
             let text = format!("{:.0} %", LEVELS[level] * 100.0);
@@ -376,12 +370,9 @@ impl Overlay<'_> {
             let y = rect.center().y;
             let ends = [Pos2::new(at.x, y), Pos2::new(at.x + 20.0, y)];
             let (stroke, [dash, gap]) = (Stroke::new(2.0, IMAGE.isodose[level]), DASHES[level]);
-            if gap > 0.0 {
-                self.painter.extend(Shape::dashed_line(&ends, stroke, dash, gap));
-            } else {
-                self.painter.line_segment(ends, stroke);
-            }
+            self.painter.extend(Shape::dashed_line(&ends, stroke, dash, gap));
             at.y -= 16.0;
         }
+        self.word(at, Align2::LEFT_BOTTOM, of, 11.0, IMAGE.text);
     }
 }
