@@ -69,8 +69,15 @@ pub fn plots_ui(
             title(ui, "Force along the needle, N", &force, tokens.force).explained("force on the hand");
             recent(ui, "force", tokens.force, ("N", 2), [-0.5, 2.0], Quantity::ResistanceN);
             let depth = now(shown.state.map(|s| format::length(s.depth_m)));
-            title(ui, "Depth, mm", &depth, tokens.depth).explained("depth");
-            recent(ui, "depth", tokens.depth, ("mm", 1), [0.0, 10.0], Quantity::DepthMm);
+            title(ui, "Past the membrane, mm", &depth, tokens.depth).explained("past the membrane");
+            recent(
+                ui,
+                "past the membrane",
+                tokens.depth,
+                ("mm", 1),
+                [0.0, 10.0],
+                Quantity::DepthMm,
+            );
         }
     }
     let worst = now(shown

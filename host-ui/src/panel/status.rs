@@ -197,7 +197,7 @@ fn figures_ui(ui: &mut egui::Ui, shown: &Shown) {
     let state = shown.state.as_ref();
     let na = || "n/a".to_owned();
     figure(ui, "phase", shown.phase(), 126.0);
-    figure(ui, "depth", &state.map_or_else(na, |s| format::length(s.depth_m)), 72.0);
+    figure(ui, "depth", &shown.depth_m().map_or_else(na, format::length), 72.0);
     figure(
         ui,
         "speed",

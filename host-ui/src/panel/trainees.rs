@@ -110,7 +110,7 @@ fn needle(state: &stylet_shm_schema::HapticState) -> String {
     }
     let rests = stylet_procedure::tolerance::is_at_rest(state.speed_m_per_s);
     let pace = if rests { ", at rest" } else { "" };
-    format!("needle in at {:.0} mm{pace}", state.depth_m * 1e3)
+    format!("{:.0} mm past the membrane{pace}", state.depth_m * 1e3)
 }
 
 fn short(fault: Fault) -> &'static str {
@@ -254,7 +254,7 @@ mod tests {
         let line = Line::of(&one);
         assert_eq!(
             (line.level, line.state.as_str(), line.seeds.as_str()),
-            (Level::Good, "needle in at 34 mm", "2 of 5")
+            (Level::Good, "34 mm past the membrane", "2 of 5")
         );
         assert_eq!(line.force, format::force(5.0));
         if let Some(session) = &mut one.session {

@@ -217,6 +217,19 @@ impl Shown {
         })
     }
 
+    /// Returns the depth as it is shown everywhere: the distance of the tip along the needle from the
+    /// template's face, in which the entries lie; negative before it.
+    pub fn depth_m(&self) -> Option<f64> {
+        let from_face = || {
+            let (template, tip_m) = (Template::before(self.scene.as_ref()?), self.tip_m()?);
+            Some(dot(
+                [0, 1, 2].map(|a| tip_m[a] - template.middle_m[a]),
+                template.inwards,
+            ))
+        };
+        self.path_depth_m().or_else(from_face)
+    }
+
     /// Returns the depth of the tip along the planned path, from the entry.
     pub fn path_depth_m(&self) -> Option<f64> {
         let (plan, tip) = (self.plan.as_ref()?, self.tip_m()?);
