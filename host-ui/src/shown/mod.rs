@@ -241,6 +241,11 @@ impl Shown {
         Some(along(self.plan.as_ref()?, place_m))
     }
 
+    /// Returns whether the seeds belong to one needle, not to a plan of many.
+    pub fn is_one_needle_by_hand(&self) -> bool {
+        self.planning.implant.is_none() && self.plan.is_none_or(|plan| plan.prescribed.needle == 0)
+    }
+
     /// Returns the seeds of the present needle, in the order of dropping.
     pub fn own_seeds(&self) -> &[SeedPose] {
         let own = self.planning.progress.own_seeds(self.seeds.len());

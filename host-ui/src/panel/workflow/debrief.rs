@@ -50,6 +50,12 @@ pub fn dose_ui(ui: &mut egui::Ui, shown: &Shown, height: f32, otherwise: &str) {
         dose.seeds, dose.source, dose.prescription_gy
     );
     ui.label(what).explained("source").explained("prescription");
+    if shown.is_one_needle_by_hand() {
+        ui.label(theme::small(
+            "One needle is no implant: its dose has no limits to meet.",
+        ));
+        return;
+    }
     if let Some(words) = moved_words(dose, shown.body_moved_m) {
         ui.label(theme::small(&words));
     }

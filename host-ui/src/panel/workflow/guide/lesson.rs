@@ -2,7 +2,8 @@
 
 use super::membranes::{MetMembranes, Puncture};
 use crate::panel::workflow::progress::{Progress, needle_at_hand, progress};
-use crate::shown::{NeedleLine, SeedError, Shown, all_errors};
+use crate::shown::{NeedleLine, SeedError, Shown, own_errors};
+use crate::words::counted;
 use stylet_base::format;
 use stylet_procedure::{AtHand, Operation};
 
@@ -172,8 +173,35 @@ struct Depths {
     across_m: f64,
 }
 
+impl Depths {
+    fn error_m(&self) -> f64 {
+        (self.rests_m - self.planned_m).hypot(self.across_m)
+    }
+
+    /// Returns the largest part of the error, in words.
+    fn reason(&self) -> String {
+        let (by_hand_m, by_tissue_m) = (self.left_m - self.planned_m, self.rests_m - self.left_m);
+        let is_inwards = |way_m: f64| way_m > 0.0;
+        let parts = [by_hand_m.abs(), by_tissue_m.abs(), self.across_m];
+        match parts
+            .iter()
+            .position(|part| *part >= parts.iter().copied().fold(0.0, f64::max))
+        {
+            Some(0) => {
+                let way = if is_inwards(by_hand_m) { "deep" } else { "shallow" };
+                format!("it was dropped {} too {way}", format::length(parts[0]))
+            }
+            Some(1) => {
+                let way = if is_inwards(by_tissue_m) { "inwards" } else { "outwards" };
+                format!("the tissue took it {} {way}", format::length(parts[1]))
+            }
+            _ => format!("it lies {} off axis", format::length(self.across_m)),
+        }
+    }
+}
+
 fn depths(shown: &Shown) -> Vec<Depths> {
-    let of_seed = |(_, row): (usize, SeedError)| {
+    let of_seed = |row: SeedError| {
         let seed = shown.own_seeds().get(row.placed?)?;
         let rests_m = shown.depth_of_m(seed.position_m)?;
         Some(Depths {
@@ -184,7 +212,7 @@ fn depths(shown: &Shown) -> Vec<Depths> {
             across_m: row.across_m,
         })
     };
-    all_errors(shown).into_iter().filter_map(of_seed).collect()
+    own_errors(shown).into_iter().filter_map(of_seed).collect()
 }
 
 /// Explains why the seeds missed, in figures of this insertion.
@@ -226,10 +254,26 @@ fn debrief(shown: &Shown, membranes: &MetMembranes) -> Lesson {
     });
     notes.push("\"Compensate\" in a plan of many needles shifts the drop positions to compensate.".to_owned());
     Lesson {
-        what: format!(
-            "On average the seeds rest {} mm from plan along the needle. Inwards is positive.",
-            format::signed_mm(by_hand_m + by_tissue_m)
-        ),
+        what: headline(shown, membranes, &seeds),
         notes,
     }
+}
+
+/// Says how far the seeds rest from plan, which one is farthest and why, and what else went wrong.
+fn headline(shown: &Shown, membranes: &MetMembranes, seeds: &[Depths]) -> String {
+    let mean_m = seeds.iter().map(Depths::error_m).sum::<f64>() / seeds.len() as f64;
+    let worst = seeds.iter().min_by(|a, b| b.error_m().total_cmp(&a.error_m()));
+    let fault = membranes.fault().map_or_else(String::new, |fault| {
+        format!("A fault turned the force off: {}. ", fault.message())
+    });
+    let missing = match own_errors(shown).iter().filter(|row| row.placed.is_none()).count() {
+        0 => String::new(),
+        count => format!(" {} missing.", counted(count, "planned seed")),
+    };
+    let worst = worst.map_or_else(String::new, |seed| {
+        let far = format::length(seed.error_m());
+        format!("; the worst is seed {}, {far} off: {}", seed.number, seed.reason())
+    });
+    let mean = format::length(mean_m);
+    format!("{fault}The seeds rest {mean} from plan on average{worst}.{missing}")
 }

@@ -1,6 +1,6 @@
 //! The membranes that a needle met, from the tick records.
 
-use stylet_shm_schema::{TickRecord, flags};
+use stylet_shm_schema::{Fault, TickRecord, flags};
 
 /// Membrane that gave way.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,6 +15,7 @@ pub struct Puncture {
 #[derive(Clone, Debug, Default)]
 pub struct MetMembranes {
     punctures: Vec<Puncture>,
+    fault: u32,
     pressed: Option<Puncture>,
     was_in_contact: bool,
     session: u64,
@@ -31,6 +32,10 @@ impl MetMembranes {
             if record.session_id != self.session || (is_in_contact && !self.was_in_contact) {
                 (self.session, self.pressed) = (record.session_id, None);
                 self.punctures.clear();
+                self.fault = 0;
+            }
+            if record.fault != 0 {
+                self.fault = record.fault;
             }
             self.was_in_contact = is_in_contact;
             let is_through = record.flags & flags::PUNCTURED != 0;
@@ -47,6 +52,12 @@ impl MetMembranes {
                 self.punctures.push(gave_way);
             }
         }
+    }
+
+    /// Returns the last fault since the insertion began; [`Fault::DeviceError`] for one that this
+    /// program does not know.
+    pub fn fault(&self) -> Option<Fault> {
+        (self.fault != 0).then(|| Fault::from_number(self.fault).unwrap_or(Fault::DeviceError))
     }
 
     /// Returns the punctures of the last insertion, the outermost first.
