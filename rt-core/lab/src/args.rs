@@ -68,7 +68,10 @@ pub struct LatencyArgs {
     /// One limit other than its default
     #[arg(long, value_name = "NAME=VALUE")]
     pub limit: Vec<String>,
-    /// Folder for report.json, report.html and histograms.hlog
+    /// Challenge of whoever asks for the measurement: it stands in the report, and its signature covers it
+    #[arg(long, value_name = "TEXT")]
+    pub nonce: Option<String>,
+    /// Folder for report.json, report.html, histograms.hlog and wakes.txt; a report that is there is not overwritten
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     #[command(flatten)]

@@ -1,13 +1,13 @@
 //! Confidence bound of a count of missed deadlines, which needs no model of the times, after Clopper and Pearson
 //! (1934).
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Confidence of every bound.
 const CONFIDENCE: f64 = 0.95;
 
 /// Bound from a count of misses in `of` grid points, if misses are independent.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MissBound {
     pub misses: u64,
     /// Grid points, served or missed.
@@ -51,47 +51,6 @@ fn upper(k: u64, n: u64, confidence: f64) -> f64 {
         }
     }
     high
-}
-
-/// Ranks, counted from 1, between whose order statistics the quantile `q` of `n` independent samples lies with 95 %
-/// confidence, for any distribution; `None` if there are too few samples.
-///
-/// The number of samples at or below the quantile is binomial (n, q); each end leaves 2.5 % (David and Nagaraja, Order
-/// Statistics, section 7.1).
-pub fn ranks_of_quantile(q: f64, n: u64) -> Option<(u64, u64)> {
-    if n == 0 {
-        return None;
-    }
-    let out = (1.0 - CONFIDENCE) / 2.0;
-    // The largest r with P(count < r) <= 2.5 %, and the smallest s with P(count < s) >= 97.5 %.
-    let first_above = |p: f64| {
-        let (mean, sd) = (q * n as f64, (q * (1.0 - q) * n as f64).sqrt());
-        // Eight deviations: the probability farther out is below 1e-10.
-        let (mut low, mut high) = (
-            (mean - 8.0 * sd - 8.0).max(0.0) as u64,
-            ((mean + 8.0 * sd + 8.0) as u64).min(n),
-        );
-        while low < high {
-            let middle = low + (high - low) / 2;
-            if binomial_cdf(middle, n, q) < p {
-                low = middle + 1
-            } else {
-                high = middle
-            }
-        }
-        low
-    };
-    let (below, above) = (first_above(out), first_above(1.0 - out) + 1);
-    // `below` is the first count whose probability passes 2.5 %: all smaller ones together stay under it.
-    (below >= 1 && above <= n).then_some((below, above))
-}
-
-/// Returns the probability of at most `k` successes in `n` trials of probability `p`.
-pub fn binomial_cdf(k: u64, n: u64, p: f64) -> f64 {
-    if k >= n {
-        return 1.0;
-    }
-    incomplete_beta((n - k) as f64, k as f64 + 1.0, 1.0 - p)
 }
 
 /// Returns the regularised incomplete beta function, by the continued fraction of Lentz.
@@ -160,35 +119,6 @@ mod tests {
         }
         // Two-sided 95 % of 1 in 10 ends at 0.4450 (the usual tables).
         assert!((upper(1, 10, 0.975) - 0.4450).abs() < 5e-5);
-    }
-
-    #[test]
-    fn ranks_of_a_quantile_leave_at_most_the_error_on_each_side() {
-        // Oracle: the binomial sum itself, and that one rank closer would leave more than 2.5 %.
-        for (q, n) in [(0.5, 20_u64), (0.9, 100), (0.99, 1_000), (0.999, 12_345)] {
-            let (r, s) = ranks_of_quantile(q, n).expect("enough samples");
-            let (mut sum, mut below) = (0.0, Vec::new());
-            let ln_choose =
-                |k: u64| ln_gamma(n as f64 + 1.0) - ln_gamma(k as f64 + 1.0) - ln_gamma((n - k) as f64 + 1.0);
-            for k in 0..=n {
-                below.push(sum);
-                sum += (ln_choose(k) + k as f64 * q.ln() + (n - k) as f64 * (-q).ln_1p()).exp();
-            }
-            let below = |rank: u64| below[rank as usize];
-            assert!(below(r) <= 0.025 && below(r + 1) > 0.025, "{q} of {n}: rank {r}");
-            assert!(below(s) >= 0.975 && below(s - 1) < 0.975, "{q} of {n}: rank {s}");
-        }
-        // The median of 20: ranks 6 and 15 (the usual tables).
-        assert_eq!(ranks_of_quantile(0.5, 20), Some((6, 15)));
-        assert_eq!(ranks_of_quantile(0.5, 5), None);
-        assert_eq!(ranks_of_quantile(0.5, 0), None);
-        // A night: the normal distribution is an oracle to within a few ranks.
-        let (r, s) = ranks_of_quantile(0.99, 300_000_000).expect("enough samples");
-        let half = 1.959_964 * (0.99_f64 * 0.01 * 3e8).sqrt();
-        assert!(
-            (r as f64 - (2.97e8 - half)).abs() < 5.0 && (s as f64 - (2.97e8 + half)).abs() < 5.0,
-            "{r} {s}"
-        );
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! Collects the times of each tick into histograms, windows and the latest wake-ups; at normal priority.
 
-use crate::sample::{Sample, histogram};
-use hdrhistogram::Histogram;
+use crate::sample::{Batched, PARTS, Sample};
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 use stylet_runtime::rt::timing::{MAX_STAGES, TickTimes};
@@ -29,6 +28,7 @@ pub struct Window {
     pub worst_wake_ns: u64,
     pub worst_work_ns: u64,
     pub missed: u32,
+    pub overruns: u32,
     pub ticks: u32,
 }
 
@@ -52,21 +52,21 @@ pub struct ToggleTime {
 pub struct LoopTiming {
     /// Names of the stages, in the order of the tick.
     pub stage_names: &'static [&'static str],
-    pub wake: Histogram<u64>,
-    pub stages: [Histogram<u64>; MAX_STAGES],
+    pub wake: Batched,
+    pub stages: [Batched; MAX_STAGES],
     /// Time from wake-up to the end of the tick, without the measurement itself.
-    pub work: Histogram<u64>,
+    pub work: Batched,
     /// Haptic: device read to force written. Tissue: tip read by the haptic loop to response published.
-    pub path: Histogram<u64>,
+    pub path: Batched,
     /// Due time to force written (haptic), or to response published (tissue).
-    pub due_to_output: Histogram<u64>,
+    pub due_to_output: Batched,
     /// Difference between the interval of two wake-ups and the period.
-    pub jitter: Histogram<u64>,
+    pub jitter: Batched,
     /// Cost of the measurement for the loop in each tick.
-    pub recording: Histogram<u64>,
+    pub recording: Batched,
     pub windows: Vec<Window>,
     pub worst: [LateTick; WORST_KEPT],
-    /// Wake-ups in the order of time, those of parts of the run, and the latest ones.
+    /// Wake-ups in the order of time.
     pub sample: Sample,
     pub first_due_ns: u64,
     last_due_ns: u64,
@@ -89,16 +89,16 @@ impl LoopTiming {
     pub fn new(stage_names: &'static [&'static str], plan: Plan) -> Self {
         Self {
             stage_names,
-            wake: histogram(),
-            stages: std::array::from_fn(|_| histogram()),
-            work: histogram(),
-            path: histogram(),
-            due_to_output: histogram(),
-            jitter: histogram(),
-            recording: histogram(),
+            wake: Batched::default(),
+            stages: std::array::from_fn(|_| Batched::default()),
+            work: Batched::default(),
+            path: Batched::default(),
+            due_to_output: Batched::default(),
+            jitter: Batched::default(),
+            recording: Batched::default(),
             windows: vec![Window::default(); plan.windows],
             worst: [LateTick::default(); WORST_KEPT],
-            sample: Sample::new(plan.grid),
+            sample: Sample::default(),
             first_due_ns: 0,
             last_due_ns: 0,
             ticks: 0,
@@ -157,6 +157,19 @@ impl LoopTiming {
         }
     }
 
+    /// Returns everything that has a histogram, by its name.
+    pub fn all(&self) -> impl Iterator<Item = (&'static str, &Batched)> {
+        let stages = self.stage_names.iter().copied().zip(&self.stages);
+        let first = [("wake", &self.wake), ("jitter", &self.jitter)];
+        let last = [
+            ("work", &self.work),
+            ("path", &self.path),
+            ("due_to_output", &self.due_to_output),
+            ("recording", &self.recording),
+        ];
+        first.into_iter().chain(stages).chain(last)
+    }
+
     fn take(&mut self, tick: &TickTimes) {
         self.seen += 1;
         self.lost = u64::from(tick.lost);
@@ -180,30 +193,34 @@ impl LoopTiming {
             self.first_due_ns = due_ns;
         }
         self.last_due_ns = due_ns;
+        // Deadlines missed before the first tick lie before the measurement.
+        let missed = if self.ticks == 0 { 0 } else { tick.missed };
+        let is_overrun = done_ns > due_ns + self.plan.period_ns;
         self.ticks += 1;
-        self.missed += u64::from(tick.missed);
-        self.overruns += u64::from(done_ns > due_ns + self.plan.period_ns);
-        self.wake.saturating_record(wake_ns);
-        self.work.saturating_record(work_ns);
+        self.missed += u64::from(missed);
+        self.overruns += u64::from(is_overrun);
+        let place = due_ns.saturating_sub(self.first_due_ns) / self.plan.period_ns;
+        let part = (place / self.plan.grid.div_ceil(PARTS as u64).max(1)) as usize;
+        self.wake.take(part, wake_ns);
+        self.work.take(part, work_ns);
         let mut before = woke_ns;
         for (histogram, &mark) in self.stages.iter_mut().zip(tick.marks()) {
-            histogram.saturating_record(mark - before);
+            histogram.take(part, mark - before);
             before = mark;
         }
         if let Some(path_ns) = tick.path_ns {
-            self.path.saturating_record(path_ns);
+            self.path.take(part, path_ns);
         }
         if let Some(output_ns) = tick.output_ns {
-            self.due_to_output.saturating_record(output_ns.saturating_sub(due_ns));
+            self.due_to_output.take(part, output_ns.saturating_sub(due_ns));
         }
         if self.last_woke_ns > 0 {
             let interval_ns = woke_ns - self.last_woke_ns;
-            self.jitter.saturating_record(interval_ns.abs_diff(self.plan.period_ns));
+            self.jitter.take(part, interval_ns.abs_diff(self.plan.period_ns));
         }
-        self.recording.saturating_record(tick.recording_ns);
-        let place = due_ns.saturating_sub(self.first_due_ns) / self.plan.period_ns;
-        self.sample.take(place, wake_ns);
-        self.note_window(due_ns, wake_ns, work_ns, tick.missed);
+        self.recording.take(part, tick.recording_ns);
+        self.sample.take(wake_ns);
+        self.note_window(due_ns, [wake_ns, work_ns], missed, is_overrun);
         let tick = LateTick {
             due_ns,
             wake_ns,
@@ -218,14 +235,16 @@ impl LoopTiming {
         self.note_worst(tick);
     }
 
-    fn note_window(&mut self, due_ns: u64, wake_ns: u64, work_ns: u64, missed: u32) {
+    fn note_window(&mut self, due_ns: u64, [wake_ns, work_ns]: [u64; 2], missed: u32, is_overrun: bool) {
         let index = (due_ns.saturating_sub(self.first_due_ns) / self.plan.window_ns) as usize;
-        if let Some(window) = self.windows.get_mut(index) {
-            window.worst_wake_ns = window.worst_wake_ns.max(wake_ns);
-            window.worst_work_ns = window.worst_work_ns.max(work_ns);
-            window.missed += missed;
-            window.ticks += 1;
-        }
+        // The last window takes all beyond the plan.
+        let last = self.windows.len() - 1;
+        let window = &mut self.windows[index.min(last)];
+        window.worst_wake_ns = window.worst_wake_ns.max(wake_ns);
+        window.worst_work_ns = window.worst_work_ns.max(work_ns);
+        window.missed += missed;
+        window.overruns += u32::from(is_overrun);
+        window.ticks += 1;
     }
 
     /// Keeps the latest wake-ups, latest first.
@@ -300,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn windows_count_from_the_first_recorded_tick_and_end_with_their_number() {
+    fn windows_count_each_recorded_tick_once() {
         let mut timing = timing();
         for i in 0..100_u64 {
             timing.take(&tick(1_000 * i, i, u32::from(i == 15)));
@@ -308,7 +327,7 @@ mod tests {
         // Ticks 2 to 11 are the first window of 10 us.
         assert_eq!(timing.windows[0].worst_wake_ns, 11);
         assert_eq!(timing.windows[1].missed, 1);
-        assert_eq!(timing.windows.iter().map(|w| w.ticks).sum::<u32>(), 40);
+        assert_eq!(timing.windows.iter().map(|w| w.ticks).sum::<u32>(), 98);
     }
 
     #[test]

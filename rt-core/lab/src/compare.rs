@@ -7,7 +7,7 @@ use crate::sample::histogram;
 use crate::summary::quantile_us;
 use clap::ValueEnum;
 use hdrhistogram::Histogram;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::io;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -24,7 +24,7 @@ const BINS: u64 = 1_000_000;
 const COMPARED: [(&str, f64); 4] = [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("max", 1.0)];
 
 /// Reference that our loops are compared with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Against {
     /// `cyclictest` (Debian package rt-tests) under the same load: same core, priority and interval
@@ -66,7 +66,7 @@ impl Against {
 /// Wake-up latency of one turn, microseconds, in the order of the comparison's `names`.
 pub type Turn = [Option<f64>; COMPARED.len()];
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Round {
     pub ours_us: Turn,
     pub others_us: Turn,
@@ -74,22 +74,22 @@ pub struct Round {
 }
 
 /// Result of the turns, or the reason why there were none.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Comparison {
     pub against: Against,
     /// Version of the other program; empty where it is this one.
     pub tool: String,
     /// Reason why nothing could be compared.
     pub absent: Option<String>,
-    pub names: [&'static str; COMPARED.len()],
+    pub names: [String; COMPARED.len()],
     pub turn_s: f64,
     pub rounds: Vec<Round>,
     /// Ours divided by the reference; below 1 ours is earlier.
     pub median_ratio: Turn,
     /// All turns together, for the picture.
-    #[serde(skip)]
+    #[serde(skip, default = "histogram")]
     pub ours: Histogram<u64>,
-    #[serde(skip)]
+    #[serde(skip, default = "histogram")]
     pub others: Histogram<u64>,
 }
 
@@ -159,7 +159,7 @@ pub fn compare(
             _ => None,
         },
         tool: tool.unwrap_or_default(),
-        names: COMPARED.map(|(name, _)| name),
+        names: COMPARED.map(|(name, _)| name.to_owned()),
         turn_s: turn_ns as f64 / 1e9,
         rounds: Vec::new(),
         median_ratio: [None; COMPARED.len()],
@@ -176,7 +176,7 @@ pub fn compare(
     };
     for _ in 0..rounds {
         let measured: Measured = measure(&setup, interrupted)?;
-        let ours = &measured.haptic.wake;
+        let ours = &measured.haptic.wake.whole;
         let others = match against {
             Against::Cyclictest => cyclictest(&setup, interrupted),
             Against::Unloaded => without(&setup, Load::None, interrupted),
@@ -197,8 +197,18 @@ pub fn compare(
             break;
         }
     }
-    comparison.median_ratio = std::array::from_fn(|i| median(comparison.rounds.iter().filter_map(|r| r.ratio[i])));
+    comparison.set_ratios();
     Ok(comparison)
+}
+
+impl Comparison {
+    /// Computes all ratios from the times of both sides.
+    pub fn set_ratios(&mut self) {
+        for round in &mut self.rounds {
+            round.ratio = ratio(&round.ours_us, &round.others_us);
+        }
+        self.median_ratio = std::array::from_fn(|i| median(self.rounds.iter().filter_map(|r| r.ratio[i])));
+    }
 }
 
 /// Runs our loops under `load`, without a trace.
@@ -208,7 +218,7 @@ fn without(setup: &Setup, load: Load, interrupted: &AtomicBool) -> Result<Histog
         trace_over_ns: None,
         ..*setup
     };
-    Ok(measure(&setup, interrupted)?.haptic.wake)
+    Ok(measure(&setup, interrupted)?.haptic.wake.whole)
 }
 
 fn turn(histogram: &Histogram<u64>) -> Turn {
@@ -224,12 +234,15 @@ fn turn(histogram: &Histogram<u64>) -> Turn {
 
 fn round(ours: &Histogram<u64>, others: &Histogram<u64>) -> Round {
     let (ours_us, others_us) = (turn(ours), turn(others));
-    let ratio = std::array::from_fn(|i| ours_us[i].zip(others_us[i]).map(|(a, b)| a / b));
     Round {
+        ratio: ratio(&ours_us, &others_us),
         ours_us,
         others_us,
-        ratio,
     }
+}
+
+fn ratio(ours_us: &Turn, others_us: &Turn) -> Turn {
+    std::array::from_fn(|i| ours_us[i].zip(others_us[i]).map(|(a, b)| a / b))
 }
 
 fn median(values: impl Iterator<Item = f64>) -> Option<f64> {

@@ -1,7 +1,8 @@
 //! Files and folders of the commands.
 
 use serde::Serialize;
-use std::io;
+use std::io::{self, Read};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use stylet_write::{WriteError, write_whole};
 
@@ -10,6 +11,8 @@ use stylet_write::{WriteError, write_whole};
 pub enum DiskError {
     #[error("cannot read {}: {source}", .path.display())]
     Read { path: PathBuf, source: io::Error },
+    #[error("{} is there already, and is not overwritten: choose another folder, or move it away", .0.display())]
+    Kept(PathBuf),
     #[error("cannot make {}: {source}", .path.display())]
     Folder { path: PathBuf, source: io::Error },
     #[error(transparent)]
@@ -28,12 +31,37 @@ impl DiskError {
     }
 }
 
+/// Most bytes of a file that is read whole: a release of this program is the largest.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// Reads a plain file: a pipe or a device in its place could hold the program for ever.
 pub fn read(path: &Path) -> Result<Vec<u8>, DiskError> {
-    std::fs::read(path).map_err(DiskError::read(path))
+    let failed = DiskError::read(path);
+    let open = std::fs::File::options()
+        .read(true)
+        .custom_flags(libc::O_NONBLOCK)
+        .open(path);
+    let file = open.map_err(&failed)?;
+    let about = file.metadata().map_err(&failed)?;
+    if !about.is_file() || about.len() > MOST_BYTES {
+        return Err(failed(io::Error::other("not a file of at most 1 GiB")));
+    }
+    let mut bytes = Vec::new();
+    file.take(MOST_BYTES).read_to_end(&mut bytes).map_err(&failed)?;
+    Ok(bytes)
 }
 
 pub fn read_text(path: &Path) -> Result<String, DiskError> {
-    std::fs::read_to_string(path).map_err(DiskError::read(path))
+    let text = String::from_utf8(read(path)?);
+    text.map_err(|_| DiskError::read(path)(io::ErrorKind::InvalidData.into()))
+}
+
+/// Fails if `file` exists: evidence is never overwritten.
+pub fn keep_what_is_there(file: &Path) -> Result<(), DiskError> {
+    match file.symlink_metadata() {
+        Ok(_) => Err(DiskError::Kept(file.to_owned())),
+        Err(_) => Ok(()),
+    }
 }
 
 /// Makes a folder and those above it.

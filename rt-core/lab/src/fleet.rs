@@ -8,11 +8,11 @@ mod table;
 
 use crate::disk::{self, DiskError};
 use crate::plots::DrawError;
-use crate::saved::NotCounted;
+use crate::saved::{NotCounted, Saved};
 use crate::verdict::{self, Outcome};
 use clap::Args;
 use entry::Entry;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use stylet_text::printable_line;
 use stylet_write::write_whole;
@@ -28,6 +28,10 @@ pub struct FleetArgs {
     /// Folders with reports of `rt-core latency`, at any depth
     #[arg(required = true, value_name = "DIR")]
     pub folders: Vec<PathBuf>,
+    /// Who may sign: OpenSSH's file of allowed signers. A report with another key is not counted, and one without a
+    /// signature leaves its PC open
+    #[arg(long, value_name = "FILE")]
+    pub allowed_signers: Option<PathBuf>,
     /// Folder for fleet.html and fleet.csv
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -63,7 +67,8 @@ impl Pc {
 
 /// Reads all reports and writes page and table.
 ///
-/// Returns 0 when the latest report of every PC passes, 1 when one fails, 2 when one is open or could not be read.
+/// Returns 0 when the latest report of every PC passes, 1 when one fails, 2 when one is open, or could not be
+/// read or verified.
 ///
 /// # Errors
 /// A folder cannot be read, no report is found, or the files cannot be written.
@@ -75,7 +80,7 @@ pub fn run(args: &FleetArgs) -> Result<u8, FleetError> {
     files.sort();
     // One folder may lie in another.
     files.dedup();
-    let (entries, unread) = read_all(&files);
+    let (entries, unread) = read_all(&files, args.allowed_signers.as_deref());
     if entries.is_empty() {
         let why: String = unread.iter().map(|u| format!("\n{u}")).collect();
         return Err(FleetError::None(why));
@@ -89,23 +94,27 @@ pub fn run(args: &FleetArgs) -> Result<u8, FleetError> {
     write_whole(&page_file, page.as_bytes()).map_err(DiskError::from)?;
     for pc in &pcs {
         println!(
-            "{:<14} {} ({}, latest of {})",
+            "{:<14} {} ({}, latest of {}; {})",
             pc.latest().outcome().words(),
             printable_line(&pc.name),
             page::counted(pc.entries.len(), "report", "reports"),
-            printable_line(&pc.latest().report.made_at)
+            printable_line(&pc.latest().report.made_at),
+            printable_line(&pc.latest().report.notes.join("; "))
         );
     }
     unread
         .iter()
         .for_each(|u| println!("not counted    {}", printable_line(&u.to_string())));
     println!("{}\n{}", page_file.display(), table_file.display());
-    Ok(exit_code(&pcs, &unread))
+    Ok(exit_code(&pcs, &unread, args.allowed_signers.is_some()))
 }
 
-fn exit_code(pcs: &[Pc], unread: &[NotCounted]) -> u8 {
+/// Returns the code for the shell; `signed` says whether reports must be signed.
+fn exit_code(pcs: &[Pc], unread: &[NotCounted], signed: bool) -> u8 {
+    let doubted = |r: &Saved| r.doubts().next().is_some() || (signed && r.is_unsigned());
+    let open = !unread.is_empty() || pcs.iter().any(|pc| doubted(&pc.latest().report));
     match verdict::overall(pcs.iter().map(|pc| pc.latest().outcome())) {
-        Outcome::Pass if !unread.is_empty() => Outcome::NotMeasurable.exit_code(),
+        Outcome::Pass if open => Outcome::NotMeasurable.exit_code(),
         worst => worst.exit_code(),
     }
 }
@@ -124,15 +133,16 @@ fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), DiskError> {
     Ok(())
 }
 
-fn read_all(files: &[PathBuf]) -> (Vec<Entry>, Vec<NotCounted>) {
+fn read_all(files: &[PathBuf], allowed: Option<&Path>) -> (Vec<Entry>, Vec<NotCounted>) {
     let (mut entries, mut unread): (Vec<Entry>, Vec<NotCounted>) = (Vec::new(), Vec::new());
+    let mut digests = BTreeSet::new();
     for (i, file) in files.iter().enumerate() {
         if files.len() >= 100 && i % 100 == 0 {
             eprintln!("rt-core: report {} of {}", i + 1, files.len());
         }
-        match entry::read(file) {
+        match entry::read(file, allowed) {
             // A copy of a report is the same measurement.
-            Ok(entry) if entries.iter().any(|e| e.report.sha256 == entry.report.sha256) => unread.push(NotCounted {
+            Ok(entry) if !digests.insert(entry.report.sha256.clone()) => unread.push(NotCounted {
                 path: entry.path,
                 why: "a copy of a report that is already counted".to_owned(),
             }),

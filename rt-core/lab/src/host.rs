@@ -2,8 +2,7 @@
 //!
 //! The observer is a separate process, like every host: the force process maps no memory that a host could write.
 
-use crate::sample::histogram;
-use hdrhistogram::Histogram;
+use crate::sample::{Batched, PARTS};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -37,9 +36,9 @@ const PATIENCE_PASSES: u32 = 14_000;
 /// Observations of the host.
 pub struct HostReport {
     /// Tip read by the haptic loop to snapshot seen here.
-    pub tip_to_host: Histogram<u64>,
+    pub tip_to_host: Batched,
     /// Tissue tick woken to snapshot seen here.
-    pub tissue_to_host: Histogram<u64>,
+    pub tissue_to_host: Batched,
     pub snapshots: u64,
     pub records: u64,
     /// Ticks without a record among those seen.
@@ -118,6 +117,8 @@ pub struct Host {
     sent: u64,
     last_tick: u64,
     warm_up_ticks: u64,
+    /// Part of the run.
+    part: usize,
     step: u64,
     renewed_ns: u64,
     /// The other hand moves as well.
@@ -161,12 +162,13 @@ impl Host {
             pose_times,
             sent: 0,
             last_tick: 0,
+            part: 0,
             step: 0,
             renewed_ns: 0,
             moves_second,
             report: HostReport {
-                tip_to_host: histogram(),
-                tissue_to_host: histogram(),
+                tip_to_host: Batched::default(),
+                tissue_to_host: Batched::default(),
                 snapshots: 0,
                 records: 0,
                 records_missing: 0,
@@ -198,6 +200,7 @@ impl Host {
                 return Err(HostError::Silent((now_ns - began_ns) / 1_000_000_000));
             }
             if first_ns > 0 {
+                self.part = ((now_ns - first_ns) * PARTS as u64 / duration_ns) as usize;
                 self.follow_script(now_ns - first_ns);
                 self.keep_moving(now_ns);
                 if now_ns - first_ns >= duration_ns {
@@ -224,9 +227,9 @@ impl Host {
     fn take_snapshot(&mut self, seen: &SeenSnapshot) {
         self.report.snapshots += 1;
         let since = |time_ns: u64| seen.seen_ns.saturating_sub(time_ns);
-        self.report.tissue_to_host.saturating_record(since(seen.time_ns));
+        self.report.tissue_to_host.take(self.part, since(seen.time_ns));
         if let Some(pose_ns) = self.pose_times.of(seen.tissue_tick).filter(|&t| t > 0) {
-            self.report.tip_to_host.saturating_record(since(pose_ns));
+            self.report.tip_to_host.take(self.part, since(pose_ns));
         }
     }
 

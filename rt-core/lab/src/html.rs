@@ -5,20 +5,27 @@ mod machine;
 mod steady;
 pub mod times;
 
-use crate::measure::Measured;
 use crate::plots::{self, BLUE, DrawError, ORANGE, Series};
-use crate::report::{NO_DIGEST, Report};
-use crate::verdict::Outcome;
+use crate::raw::Raw;
+use crate::report::{HISTOGRAMS, Report};
+use crate::verdict::{LimitResult, Outcome};
+use crate::whose::Whose;
 use maud::{Markup, PreEscaped, html};
 use stylet_report::parts::{Column, cards, cell, micro, num, or_na, table};
 
-/// Returns the whole page, with the report's digest once as zeros.
-pub fn page(report: &Report, measured: &Measured) -> Result<String, DrawError> {
-    let pictures = pictures(report, measured)?;
+/// Returns the whole page. It has the digest of the raw data; the report has that of the page.
+pub fn page(report: &Report, raw: &Raw) -> Result<String, DrawError> {
+    let pictures = pictures(report, raw)?;
+    let digest = report
+        .files
+        .iter()
+        .find(|f| f.name == HISTOGRAMS)
+        .map_or("", |f| &f.sha256);
     let main = html! {
         (header(report))
         (key_figures(report))
-        (limits(report))
+        h2 { "Limits" }
+        (limits(&report.verdict.limits))
         (pictures)
         (times::of_loop("Force loop", &report.haptic))
         (times::of_loop("Tissue loop", &report.tissue))
@@ -36,7 +43,7 @@ pub fn page(report: &Report, measured: &Measured) -> Result<String, DrawError> {
         (machine::provenance(report))
         (machine::method(report))
         footer {
-            "SHA-256 of report.json: " code { (NO_DIGEST) } ". Check with " code { "rt-core verify" } "."
+            "SHA-256 of " (HISTOGRAMS) ": " code { (digest) } ". Check with " code { "rt-core verify" } "."
         }
     };
     Ok(stylet_report::page(
@@ -52,10 +59,11 @@ fn header(r: &Report) -> Markup {
         header { h1 { "Latency report" } (badge(r.verdict.overall)) }
         p class="sub" {
             "Scene " b { (p.scene) } ", force loop at " b { (num(p.rate_hz)) " Hz" } ", tissue at " (num(p.tissue_rate_hz))
-            " Hz, " @if let Some(hz) = p.second_rate_hz { "second device at " (num(hz)) " Hz, " } "load " b { (p.load.name()) } " (" (p.load_is) "), " b { (num(p.measured_s.round())) " s" } " measured, "
+            " Hz, " @if let Some(hz) = p.second_rate_hz { "second device at " (num(hz)) " Hz, " } "load " b { (p.load.name()) } " (" (p.load_is) "), " b { (num(p.measured_s.round())) " s" } " measured of " (num(p.duration_s)) " s asked for, spin " (p.spin_us) " \u{b5}s, "
             (p.insertions) " insertions. " (r.made_at) ", " (r.program) "."
         }
-        @if let Some(whose) = whose(r) { p class="sub" { (whose) } }
+        @if let Some(whose) = whose(&r.whose) { p class="sub" { (whose) } }
+        @if let Some(nonce) = &r.nonce { p class="sub" { "Answers the challenge " code { (nonce) } "." } }
         @if r.environment.qualified {
             p class="note" { "Environment qualified: no reason was found to doubt the tail." }
         } @else {
@@ -70,8 +78,7 @@ fn header(r: &Report) -> Markup {
 }
 
 /// Returns operator, site and device, as far as given.
-fn whose(r: &Report) -> Option<String> {
-    let w = &r.whose;
+pub fn whose(w: &Whose) -> Option<String> {
     let serial = w.device_serial.as_ref().map(|s| format!("device {s}"));
     let named: Vec<String> = [w.operator.clone(), w.site.clone(), serial]
         .into_iter()
@@ -104,13 +111,14 @@ pub fn badge(outcome: Outcome) -> Markup {
     let class = match outcome {
         Outcome::Pass => "pass",
         Outcome::Fail => "fail",
-        Outcome::NotMeasurable => "open",
+        Outcome::NotMeasurable | Outcome::Undecided => "open",
     };
     html! { span class={ "badge " (class) } { (outcome.words()) } }
 }
 
-fn limits(r: &Report) -> Markup {
-    let row = |j: &crate::verdict::LimitResult| {
+/// Tabulates outcomes, each with its evidence.
+pub fn limits(all: &[LimitResult]) -> Markup {
+    let row = |j: &LimitResult| {
         let sign = if j.lower_bound { "\u{2265}" } else { "\u{2264}" };
         vec![
             badge(j.outcome),
@@ -121,7 +129,7 @@ fn limits(r: &Report) -> Markup {
             html! { (j.reason) br; span class="faint" { (micro(&j.evidence)) } },
         ]
     };
-    let rows: Vec<Vec<Markup>> = r.verdict.limits.iter().map(row).collect();
+    let rows: Vec<Vec<Markup>> = all.iter().map(row).collect();
     let head = ["outcome", "limit", "value", "allowed", "unit", "reason and evidence"];
     let columns = [
         Column::Text,
@@ -131,33 +139,32 @@ fn limits(r: &Report) -> Markup {
         Column::Text,
         Column::Wide,
     ];
-    html! {
-        h2 { "Limits" }
-        (table(&head, &rows, &columns))
-    }
+    table(&head, &rows, &columns)
 }
 
-fn pictures(r: &Report, m: &Measured) -> Result<Markup, DrawError> {
-    let h = &m.haptic;
+fn pictures(r: &Report, raw: &Raw) -> Result<Markup, DrawError> {
     let series = |name, color, histogram| Series { name, color, histogram };
-    let wake = || series("force loop", BLUE, &h.wake);
-    let own = series("own work", ORANGE, &h.work);
+    let [wake, work] = ["haptic/wake", "haptic/work"].map(|name| raw.get(name));
+    let force = || series("force loop", BLUE, &wake);
+    let own = series("own work", ORANGE, &work);
     let mut figures = vec![
-        ("Wake-up of the force loop", plots::wake_histogram(&[wake()])?),
-        ("Where a force tick goes", plots::stages(h)?),
-        ("Worst of each window", plots::windows(&h.windows, m.window_ns)?),
-        ("Cumulative tail", plots::tail(&[wake(), own])?),
-        ("Where a tissue tick goes", plots::stages(&m.tissue)?),
+        ("Wake-up of the force loop", plots::wake_histogram(&[force()])?),
+        ("Where a force tick goes", stages(raw, "haptic")?),
+        ("Worst of each window", plots::windows(&r.windows, r.protocol.window_s)?),
+        ("Cumulative tail", plots::tail(&[force(), own])?),
+        ("Where a tissue tick goes", stages(raw, "tissue")?),
     ];
     if let Some(c) = r.comparison.as_ref().filter(|c| !c.rounds.is_empty()) {
+        let [ours, others] = ["comparison/ours", "comparison/other"].map(|name| raw.get(name));
         let turns = [
-            series("force loop", BLUE, &c.ours),
-            series(c.against.name(), ORANGE, &c.others),
+            series("force loop", BLUE, &ours),
+            series(c.against.name(), ORANGE, &others),
         ];
         figures.push(("Wake-up on both sides, all turns", plots::wake_histogram(&turns)?));
     } else {
-        let seen = series("tip moved to host saw it", BLUE, &m.host.tip_to_host);
-        let answered = series("tip moved to tissue answered", ORANGE, &m.tissue.path);
+        let [seen, answered] = ["host/tip_to_host", "tissue/path"].map(|name| raw.get(name));
+        let seen = series("tip moved to host saw it", BLUE, &seen);
+        let answered = series("tip moved to tissue answered", ORANGE, &answered);
         figures.push(("From tip to tissue and host", plots::tail(&[seen, answered])?));
     }
     Ok(html! {
@@ -168,4 +175,22 @@ fn pictures(r: &Report, m: &Measured) -> Result<Markup, DrawError> {
             }
         }
     })
+}
+
+/// Plots the stages of a loop's tick: everything between jitter and work.
+fn stages(raw: &Raw, name: &str) -> Result<String, DrawError> {
+    let whole = ["wake", "jitter", "path", "due_to_output", "recording"];
+    let rows: Vec<_> = raw
+        .of_loop(name)
+        .filter(|tag| !whole.contains(tag))
+        .map(|tag| {
+            let title = if tag == "work" {
+                "whole tick".to_owned()
+            } else {
+                tag.replace('_', " ")
+            };
+            (title, raw.get(&format!("{name}/{tag}")))
+        })
+        .collect();
+    plots::stages(&rows)
 }

@@ -7,6 +7,7 @@ use crate::external::{self, ExternalError};
 use crate::files::{self, FilesError};
 use crate::machine::Machine;
 use crate::measure::{MeasureError, Setup, measure};
+use crate::raw::Raw;
 use crate::report::{self, JSON, PAGE, Parts, Report};
 use crate::sign::{self, SignError};
 use crate::spin::{self, Spin, SpinError};
@@ -59,6 +60,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
     let whose = args.whose.read()?;
     let limits = verdict::limits(options.haptic_period_ns, &args.limit)?;
     disk::make(&args.out)?;
+    disk::keep_what_is_there(&args.out.join(JSON))?;
     let mut spin_search = None;
     if args.spin_us == Spin::Auto {
         eprintln!("rt-core: looking for the smallest spin, trials of three seconds");
@@ -92,7 +94,8 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
         None => None,
     };
     let machine = Machine::this();
-    let mut report = report::report(&Parts {
+    let raw = Raw::of(&measured, comparison.as_ref());
+    let parts = Parts {
         options: &options,
         duration_ns: args.duration,
         load: args.load,
@@ -102,11 +105,11 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
         machine: &machine,
         whose: &whose,
         spin_search,
-    });
-    // The signature of an earlier report in the same folder does not apply to this one.
+        nonce: args.nonce.as_deref(),
+    };
+    let mut report = report::report(&parts, &raw);
     let json = args.out.join(JSON);
-    let _ = std::fs::remove_file(sign::signature_of(&json));
-    files::write(&args.out, &mut report, &measured)?;
+    files::write(&args.out, &mut report, &raw)?;
     print_verdict(&report);
     println!("{}", args.out.join(PAGE).display());
     println!("{}", json.display());

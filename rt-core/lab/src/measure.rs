@@ -7,12 +7,14 @@ use crate::load::{Load, LoadError, Running};
 use crate::machine::Machine;
 use crate::trace::{self, TraceSection, Watched};
 use crate::watch::{self, CoreWatch};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::time::Duration;
 use stylet_runtime::process::{self, LoopReport, Options, RunError, RunReport};
+use stylet_runtime::rt::arm::Usage;
 use stylet_runtime::rt::clock::{HAPTIC_PERIOD_NS, TISSUE_PERIOD_NS};
 use stylet_runtime::rt::haptic::HAPTIC_STAGES;
 use stylet_runtime::rt::pin::{Pin, PinError};
@@ -105,11 +107,38 @@ pub struct Measured {
     pub cores: Vec<CoreWatch>,
     pub trace: Option<TraceSection>,
     pub window_ns: u64,
+    /// When it began, whole seconds since 1970.
+    pub began_s: u64,
+}
+
+/// Counters of one loop, from arming to its end.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct LoopCounts {
+    pub ticks: u64,
+    pub missed_deadlines: u64,
+    pub overruns: u64,
+    /// Ticks that the measurement itself lost.
+    pub unmeasured: u64,
+    #[serde(flatten)]
+    pub usage: Usage,
+    pub voluntary_switches_beyond_sleep: i64,
 }
 
 /// Returns the voluntary switches beyond one for each sleep.
-pub fn switches_beyond_sleep(report: &LoopReport) -> i64 {
+fn switches_beyond_sleep(report: &LoopReport) -> i64 {
     (report.usage.voluntary_switches - report.sleeps as i64).max(0)
+}
+
+/// Returns the counters of a loop.
+pub fn counts(run: &LoopReport, timing: &LoopTiming) -> LoopCounts {
+    LoopCounts {
+        ticks: run.ticks,
+        missed_deadlines: timing.missed,
+        overruns: timing.overruns,
+        unmeasured: timing.lost,
+        usage: run.usage,
+        voluntary_switches_beyond_sleep: switches_beyond_sleep(run),
+    }
 }
 
 pub fn window_ns(duration_ns: u64) -> u64 {
@@ -143,6 +172,7 @@ fn watch_core(options: &Options) -> Option<usize> {
 /// Runs for `setup.duration_ns` after the first tick that a host saw, or until `interrupted`.
 pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, MeasureError> {
     process::limits::check().map_err(RunError::from)?;
+    let began_s = jiff::Timestamp::now().as_second().max(0) as u64;
     let script = Script::of(&Scene::builtin(&setup.options.scene)?);
     let pose_times = Arc::new(PoseTimes::default());
     let options = setup.options;
@@ -259,6 +289,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         cores,
         trace: trace.transpose().map_err(panicked)?,
         window_ns,
+        began_s,
     })
 }
 
@@ -270,7 +301,6 @@ pub fn period_ns(rate_hz: u32) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stylet_runtime::rt::arm::Usage;
 
     #[test]
     fn windows_cover_the_run_and_are_few() {

@@ -6,7 +6,7 @@ mod trend;
 pub use maxima::{MaximaPart, maxima};
 pub use trend::{TrendPoint, trend, trend_range_us};
 
-use crate::collect::{LoopTiming, Window};
+use crate::report::WindowRow;
 use hdrhistogram::Histogram;
 use plotters::coord::ranged1d::{KeyPointHint, Ranged, ValueFormatter};
 use plotters::prelude::*;
@@ -148,9 +148,7 @@ fn beyond(series: &Series, right_us: f64) -> String {
 }
 
 /// Plots the parts of a tick's time: for each stage a bar from p50 to p99.9 and a point at the maximum.
-pub fn stages(timing: &LoopTiming) -> Result<String, DrawError> {
-    let named = timing.stage_names.iter().copied().zip(&timing.stages);
-    let rows: Vec<(&str, &Histogram<u64>)> = named.chain([("whole tick", &timing.work)]).collect();
+pub fn stages(rows: &[(String, Histogram<u64>)]) -> Result<String, DrawError> {
     picture(|root| {
         let us = |ns: u64| (ns as f64 / 1e3).max(0.01);
         let longest = rows.iter().map(|(_, h)| us(h.max())).fold(0.1, f64::max);
@@ -163,7 +161,7 @@ pub fn stages(timing: &LoopTiming) -> Result<String, DrawError> {
         for (row, (name, h)) in rows.iter().enumerate() {
             let y = count - row as f64 - 0.5;
             let [p50, p999] = [0.5, 0.999].map(|q| us(h.value_at_quantile(q)));
-            let color = if *name == "whole tick" { ORANGE } else { BLUE };
+            let color = if name == "whole tick" { ORANGE } else { BLUE };
             chart.draw_series([PathElement::new(
                 [(p50, y), (us(h.max()), y)],
                 color.mix(0.35).stroke_width(1),
@@ -175,28 +173,18 @@ pub fn stages(timing: &LoopTiming) -> Result<String, DrawError> {
             chart.draw_series([Circle::new((us(h.max()), y), 3, color.filled())])?;
             let (_, at) = chart.backend_coord(&(0.01, y));
             let style = label(12).pos(Pos::new(HPos::Right, VPos::Center));
-            root.draw(&Text::new((*name).to_owned(), (128, at), style))?;
+            root.draw(&Text::new(name.clone(), (128, at), style))?;
         }
         Ok(())
     })
 }
 
 /// Plots the worst wake-up and the longest tick of each window of the run.
-pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, DrawError> {
+pub fn windows(windows: &[WindowRow], window_s: f64) -> Result<String, DrawError> {
     picture(|root| {
-        let used: Vec<(f64, &Window)> = windows
-            .iter()
-            .enumerate()
-            .filter(|(_, w)| w.ticks > 0)
-            .map(|(i, w)| (i as f64 * window_ns as f64 / 1e9, w))
-            .collect();
-        let window_s = window_ns as f64 / 1e9;
-        let right = used.last().map_or(1.0, |(t, _)| t + window_s);
-        let us = |ns: u64| (ns as f64 / 1e3).max(0.1);
-        let all = || {
-            used.iter()
-                .flat_map(|(_, w)| [us(w.worst_wake_ns), us(w.worst_work_ns)])
-        };
+        let right = windows.last().map_or(1.0, |w| w.at_s + window_s);
+        let us = |us: f64| us.max(0.1);
+        let all = || windows.iter().flat_map(|w| [us(w.worst_wake_us), us(w.worst_work_us)]);
         let low = all().fold(f64::MAX, f64::min).min(1.0).log10().floor();
         let high = all().fold(1.0, f64::max);
         let mut chart = chart(root, 58)
@@ -204,10 +192,10 @@ pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, DrawError> 
             .build_cartesian_2d(0.0..right, Decades(10_f64.powf(low)..10.0 * decade_above(high), number))?;
         mesh(&mut chart, "time into the run, s", "worst in a window, \u{b5}s")?;
         for (color, of) in [
-            (BLUE, (|w| w.worst_wake_ns) as fn(&Window) -> u64),
-            (ORANGE, |w| w.worst_work_ns),
+            (BLUE, (|w| w.worst_wake_us) as fn(&WindowRow) -> f64),
+            (ORANGE, |w| w.worst_work_us),
         ] {
-            let line = used.iter().map(|(t, w)| (*t + window_s / 2.0, us(of(w))));
+            let line = windows.iter().map(|w| (w.at_s + window_s / 2.0, us(of(w))));
             chart.draw_series(LineSeries::new(line, color.stroke_width(1)))?;
         }
         legend(root, &[("wake-up".to_owned(), BLUE), ("whole tick".to_owned(), ORANGE)])

@@ -14,7 +14,7 @@ pub const COMMIT: &str = env!("STYLET_COMMIT");
 const TOOLCHAIN: &str = env!("STYLET_TOOLCHAIN");
 
 /// A program of Stylet on this machine.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ProgramDigest {
     pub name: String,
     pub sha256: String,
@@ -64,7 +64,7 @@ pub struct Fact {
 }
 
 /// A real-time setting: the request, and the kernel's report.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Setting {
     pub name: String,
     pub asked: String,
@@ -148,7 +148,7 @@ pub fn facts(machine: &Machine, options: &Options) -> Vec<Fact> {
     };
     let hz = reported(machine.build_option("HZ"));
     let idle = ["driver", "governor"].map(|of| reported(text(&format!("sys/devices/system/cpu/cpuidle/current_{of}"))));
-    let hypervisor = machine.hypervisor().unwrap_or_else(|| "none found".to_owned());
+    let hypervisor = machine.hypervisor().unwrap_or_else(|| NO_HYPERVISOR.to_owned());
     let swaps = text("proc/swaps").map_or(0, |t| t.lines().count().saturating_sub(1));
     let memory =
         text("proc/meminfo").and_then(|t| Some(t.lines().next()?.trim_start_matches("MemTotal:").trim().to_owned()));
@@ -286,12 +286,7 @@ pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Se
         let scheduling = |policy, priority| format!("{} {priority}", policy_name(policy));
         let met = (t.policy, t.priority) == (asked, t.asked_priority);
         let (wanted, got) = (scheduling(asked, t.asked_priority), scheduling(t.policy, t.priority));
-        add(
-            &format!("{name} thread: policy and priority"),
-            wanted,
-            got,
-            met && asked == 1,
-        );
+        add(&format!("{name} {POLICY}"), wanted, got, met && asked == 1);
         let core = |c: u32| if c == u32::MAX { "any".to_owned() } else { c.to_string() };
         add(
             &format!("{name} thread: core"),
@@ -312,7 +307,7 @@ pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Se
         .unwrap_or("not reported")
         .trim();
     add(
-        "memory lock",
+        MEMORY_LOCK,
         "all pages, present and future".to_owned(),
         format!("{locked} locked"),
         run.memory_locked,
@@ -337,21 +332,11 @@ pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Se
     settings
 }
 
-/// Returns why the tail of a measurement reflects this environment rather than the program; empty if it does not.
-pub fn unqualified(machine: &Machine, run: &RunReport) -> Vec<String> {
-    let mut reasons = Vec::new();
-    if let Some(name) = machine.hypervisor() {
-        reasons.push(format!("virtual machine ({name})"));
-    }
-    let loops = [&run.haptic, &run.tissue].into_iter().chain(&run.second);
-    if !loops.into_iter().all(|report| report.thread.is_fifo()) {
-        reasons.push("the loops ran without SCHED_FIFO".to_owned());
-    }
-    if !run.memory_locked {
-        reasons.push("memory was not locked".to_owned());
-    }
-    reasons
-}
+/// Value of the fact `hypervisor` on a bare machine.
+pub const NO_HYPERVISOR: &str = "none found";
+/// End of the names of the settings of threads, and name of that of memory.
+pub const POLICY: &str = "thread: policy and priority";
+pub const MEMORY_LOCK: &str = "memory lock";
 
 #[cfg(test)]
 mod tests {
@@ -386,12 +371,5 @@ mod tests {
         // Ten half periods of delay leave an eleventh.
         let late = stiffness_margin_n_per_m(1_000_000, 5e6);
         assert!((none / late - 11.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn lack_of_real_time_rights_disqualifies_the_tail() {
-        let bare = Machine::at("/nowhere");
-        let run = RunReport::default();
-        assert_eq!(unqualified(&bare, &run).len(), 2);
     }
 }

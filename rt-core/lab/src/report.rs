@@ -1,8 +1,11 @@
 //! The report of a measurement: everything in one record, written as JSON, as a page, and as raw histograms.
 
 mod assemble;
+mod derive;
 
+pub use crate::measure::LoopCounts;
 pub use assemble::{Parts, report, window_rows};
+pub use derive::{contradictions, derive, limits_of};
 
 use crate::bound::MissBound;
 use crate::compare::Comparison;
@@ -16,24 +19,23 @@ use crate::verdict::{LimitResult, Outcome};
 use crate::watch::CoreWatch;
 use crate::whose::Whose;
 use serde::{Deserialize, Serialize};
-use stylet_runtime::rt::arm::Usage;
 
 /// Version of the format: incremented when a field changes its meaning, or one that `saved` reads is removed.
-pub const SCHEMA: &str = "stylet.latency/1";
+pub const SCHEMA: &str = "stylet.latency/2";
+/// Version before figures could be computed again from the files of the report.
+pub const OLD_SCHEMA: &str = "stylet.latency/1";
 pub const JSON: &str = "report.json";
 pub const PAGE: &str = "report.html";
 pub const HISTOGRAMS: &str = "histograms.hlog";
-/// Placeholder for the digest while it is computed.
-pub const NO_DIGEST: &str = "0000000000000000000000000000000000000000000000000000000000000000";
-
-/// File in the report's folder. The page's digest is computed with the report's own digest as zeros.
-#[derive(Clone, Debug, Serialize)]
+pub const WAKES: &str = "wakes.txt";
+/// File in the report's folder, with the digest that `sha256sum` prints.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FileDigest {
-    pub name: &'static str,
+    pub name: String,
     pub sha256: String,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Protocol {
     pub scene: String,
     pub load: Load,
@@ -41,29 +43,18 @@ pub struct Protocol {
     pub rate_hz: f64,
     pub tissue_rate_hz: f64,
     /// Rate of the second device's loop, in a run that has one.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub second_rate_hz: Option<f64>,
     pub duration_s: f64,
     pub measured_s: f64,
     pub warm_up_s: f64,
     pub spin_us: u64,
     pub insertions: u64,
+    /// Length of the windows.
+    pub window_s: f64,
 }
 
-/// Counters of one loop, from arming to its end.
-#[derive(Clone, Debug, Serialize)]
-pub struct LoopCounts {
-    pub ticks: u64,
-    pub missed_deadlines: u64,
-    pub overruns: u64,
-    /// Ticks that the measurement itself lost.
-    pub unmeasured: u64,
-    #[serde(flatten)]
-    pub usage: Usage,
-    pub voluntary_switches_beyond_sleep: i64,
-}
-
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct LoopSection {
     pub times: Vec<Summary>,
     pub counts: LoopCounts,
@@ -72,7 +63,7 @@ pub struct LoopSection {
     pub work_p999_of_period: Option<f64>,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct HostSection {
     pub times: Vec<Summary>,
     pub snapshots: u64,
@@ -83,23 +74,23 @@ pub struct HostSection {
     pub which_faults: Vec<String>,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Margin {
-    pub at: &'static str,
+    pub at: String,
     pub delay_us: Option<f64>,
     pub k_max_n_per_m: Option<f64>,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct StiffnessSection {
-    pub rule: &'static str,
+    pub rule: String,
     pub hand_damping_n_s_per_m: f64,
     pub law_damping_n_s_per_m: f64,
     pub margins: Vec<Margin>,
 }
 
 /// One of the latest wake-ups, and simultaneous observations elsewhere.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Late {
     pub at_s: f64,
     pub wake_us: f64,
@@ -115,10 +106,11 @@ pub struct WindowRow {
     pub worst_wake_us: f64,
     pub worst_work_us: f64,
     pub missed: u32,
+    pub overruns: u32,
     pub ticks: u32,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct GapSection {
     pub core: Option<usize>,
     pub watched_s: f64,
@@ -127,31 +119,33 @@ pub struct GapSection {
     pub wake: Summary,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Environment {
     pub qualified: bool,
     pub evidence: Vec<String>,
 }
 
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Verdict {
     pub overall: Outcome,
     pub limits: Vec<LimitResult>,
 }
 
 /// The whole report, declared in reading order.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Report {
-    pub schema: &'static str,
+    pub schema: String,
     pub sha256: String,
-    pub sha256_is_of: &'static str,
+    pub sha256_is_of: String,
     pub files: Vec<FileDigest>,
     pub made_at: String,
     pub program: String,
-    pub commit: &'static str,
+    pub commit: String,
     pub command: Vec<String>,
-    /// Missing from reports of older versions, as is `programs`.
     pub whose: Whose,
+    /// Challenge of whoever asked for the measurement.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nonce: Option<String>,
     pub programs: Vec<ProgramDigest>,
     pub protocol: Protocol,
     pub verdict: Verdict,
@@ -159,24 +153,23 @@ pub struct Report {
     pub haptic: LoopSection,
     pub tissue: LoopSection,
     /// The loop of the second device, in a run that has one.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub second: Option<LoopSection>,
     pub host: HostSection,
     pub stiffness: StiffnessSection,
     pub windows: Vec<WindowRow>,
     pub latest_wake_ups: Vec<Late>,
     /// Late ticks with their causes, if a trace was requested.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trace: Option<TraceSection>,
-    /// Wake-ups of the force loop in equal parts of the run. Reports of older versions have neither this nor
-    /// `stationarity`.
+    /// Wake-ups of the force loop in equal parts of the run.
     pub parts: Vec<Summary>,
     pub stationarity: Stationarity,
     pub gaps: GapSection,
     pub cores: Vec<CoreWatch>,
     pub comparison: Option<Comparison>,
     /// Search for the spin; only with `--spin-us auto`.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spin_search: Option<SpinSearch>,
     pub settings: Vec<Setting>,
     pub facts: Vec<Fact>,

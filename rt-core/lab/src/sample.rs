@@ -1,6 +1,7 @@
-//! Samples of a run kept with its histograms, for a later examination of dependence and change.
+//! Samples of a run: histograms of the whole and of its equal parts, and wake-ups in the order of time.
 
 use hdrhistogram::Histogram;
+use std::ops::Deref;
 
 /// Longest time that a histogram resolves; longer ones count as this.
 const LONGEST_NS: u64 = 10_000_000_000;
@@ -16,35 +17,61 @@ pub fn histogram() -> Histogram<u64> {
     Histogram::new_with_bounds(1, LONGEST_NS, DIGITS).expect("the bounds are constants that fit")
 }
 
-/// Wake-ups of one loop. Everything is allocated before the run.
-pub struct Sample {
-    /// Histograms of equal parts of the run.
+/// Values of a run, together and in its equal parts, whose differences show how far values depend on each other.
+#[derive(Clone)]
+pub struct Batched {
+    pub whole: Histogram<u64>,
     pub parts: Vec<Histogram<u64>>,
+}
+
+impl Default for Batched {
+    fn default() -> Self {
+        Self {
+            whole: histogram(),
+            parts: (0..PARTS).map(|_| histogram()).collect(),
+        }
+    }
+}
+
+impl Deref for Batched {
+    type Target = Histogram<u64>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.whole
+    }
+}
+
+impl Batched {
+    /// Takes a value of that part of the run; the last part takes all beyond the plan.
+    pub fn take(&mut self, part: usize, ns: u64) {
+        self.whole.saturating_record(ns);
+        self.parts[part.min(PARTS - 1)].saturating_record(ns);
+    }
+}
+
+/// Wake-ups of one loop in the order of time. Everything is allocated before the run.
+#[derive(Clone)]
+pub struct Sample {
     /// Wake-up latencies of every [`Sample::stride`]th tick, in nanoseconds.
     pub series: Vec<u64>,
     /// Ticks from one entry of the series to the next.
     pub stride: u64,
-    part_grid: u64,
     ticks: u64,
 }
 
-impl Sample {
-    /// Makes a sample of a run with `grid` planned grid points.
-    pub fn new(grid: u64) -> Self {
+impl Default for Sample {
+    fn default() -> Self {
         Self {
-            parts: (0..PARTS).map(|_| histogram()).collect(),
             series: Vec::with_capacity(SERIES),
             stride: 1,
-            part_grid: grid.div_ceil(PARTS as u64).max(1),
             ticks: 0,
         }
     }
+}
 
-    /// Takes a tick at the grid point `place` that woke `wake_ns` late.
-    pub fn take(&mut self, place: u64, wake_ns: u64) {
-        if let Some(part) = self.parts.get_mut((place / self.part_grid) as usize) {
-            part.saturating_record(wake_ns);
-        }
+impl Sample {
+    /// Takes a tick that woke `wake_ns` late.
+    pub fn take(&mut self, wake_ns: u64) {
         if self.ticks.is_multiple_of(self.stride) {
             if self.series.len() == SERIES {
                 self.thin();
@@ -76,28 +103,34 @@ mod tests {
     fn series_is_every_so_manieth_tick() {
         let mut random = Random(7);
         let all: Vec<u64> = (0..100_000).map(|_| random.draw() % 1_000_003).collect();
-        let mut sample = Sample::new(100_000);
-        for (i, &ns) in all.iter().enumerate() {
-            sample.take(i as u64, ns);
-        }
+        let mut sample = Sample::default();
+        all.iter().for_each(|&ns| sample.take(ns));
         assert_eq!(sample.stride, 8);
         let expected: Vec<u64> = all.iter().step_by(8).copied().collect();
         assert_eq!(sample.series, expected);
     }
 
     #[test]
-    fn parts_have_equal_shares_and_nothing_is_allocated_on_the_way() {
-        let mut sample = Sample::new(80_000);
+    fn parts_and_whole_hold_each_value_once() {
+        let mut all = Batched::default();
+        for i in 0..90_000 {
+            all.take(i / 10_000, i as u64 / 10_000 + 1);
+        }
+        let counts: Vec<u64> = all.parts.iter().map(Histogram::len).collect();
+        // What lies beyond the plan belongs to the last part.
+        assert_eq!(counts, [10_000, 10_000, 10_000, 10_000, 10_000, 10_000, 10_000, 20_000]);
+        let mut joined = histogram();
+        all.parts
+            .iter()
+            .for_each(|part| joined.add(part).expect("the same bins"));
+        assert_eq!(joined, all.whole);
+    }
+
+    #[test]
+    fn the_series_is_never_allocated_anew() {
+        let mut sample = Sample::default();
         let room = sample.series.capacity();
-        for i in 0..80_000 {
-            sample.take(i, i / 10_000 + 1);
-        }
-        for (i, part) in sample.parts.iter().enumerate() {
-            assert_eq!(
-                (part.len(), part.min(), part.max()),
-                (10_000, i as u64 + 1, i as u64 + 1)
-            );
-        }
+        (0..80_000).for_each(|i| sample.take(i));
         assert_eq!(sample.series.capacity(), room);
     }
 }

@@ -1,7 +1,10 @@
-//! A saved report, as far as others read it. Reports of all versions of schema 1 are read.
+//! A saved report, as far as others read it. Reports of schema 1 are read too, and marked.
 
+use crate::disk;
 use crate::provenance::Fact;
-use crate::report::{JSON, SCHEMA};
+use crate::report::JSON;
+use crate::sealed;
+use crate::sign;
 use crate::verdict::Outcome;
 use crate::verify;
 use crate::whose::Whose;
@@ -26,6 +29,9 @@ pub struct Saved {
     pub facts: Vec<Fact>,
     #[serde(default)]
     pub settings: Vec<Setting>,
+    /// Signer, and what could not be verified.
+    #[serde(skip)]
+    pub notes: Vec<String>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -96,21 +102,34 @@ pub struct NotCounted {
     pub why: String,
 }
 
-/// Reads the report `file`; an altered one is refused, and one with an altered page or raw data in its folder. Both may
-/// be missing: reports are often collected without them.
-pub fn read(file: &Path) -> Result<Saved, NotCounted> {
+impl Saved {
+    /// Returns what could not be verified, except for a missing signature.
+    pub fn doubts(&self) -> impl Iterator<Item = &String> {
+        self.notes
+            .iter()
+            .filter(|n| n.ends_with(sealed::MISSING) || *n == verify::OLDER)
+    }
+
+    pub fn is_unsigned(&self) -> bool {
+        self.notes.iter().any(|n| n == sign::UNSIGNED)
+    }
+}
+
+/// Reads the report `file`; an altered one is refused, as is one that contradicts itself or has a wrong signature. Page
+/// and raw data may be missing: reports are often collected without them; the notes say so.
+pub fn read(file: &Path, allowed: Option<&Path>) -> Result<Saved, NotCounted> {
     let refused = |why: String| NotCounted {
         path: file.display().to_string(),
         why,
     };
-    let text = std::fs::read_to_string(file).map_err(|e| refused(e.to_string()))?;
-    let report: serde_json::Value = serde_json::from_str(&text).map_err(|e| refused(format!("not JSON: {e}")))?;
-    if report["schema"] != SCHEMA {
-        return Err(refused(format!("schema {}, expected {SCHEMA:?}", report["schema"])));
-    }
-    let altered = verify::problems(&text, |name| std::fs::read(file.with_file_name(name)).ok());
-    if let Some(problem) = altered.into_iter().find(|p| !p.ends_with(": missing")) {
+    let text = disk::read_text(file).map_err(|e| refused(e.to_string()))?;
+    let checked = verify::check(file, &text, allowed);
+    if let Some(problem) = checked.problems.into_iter().next() {
         return Err(refused(problem));
     }
-    serde_json::from_value(report).map_err(|e| refused(format!("not the {JSON} of a measurement: {e}")))
+    let report = serde_json::from_str(&text).map_err(|e| refused(format!("not the {JSON} of a measurement: {e}")))?;
+    Ok(Saved {
+        notes: checked.notes,
+        ..report
+    })
 }

@@ -94,6 +94,33 @@ pub fn sign(file: &Path, key: &Path) -> Result<PathBuf, SignError> {
     })
 }
 
+/// Note of a report without a signature.
+pub const UNSIGNED: &str = "not signed";
+
+/// Returns the signer of the report, or the problem with its signature.
+pub fn signer(file: &Path, allowed: Option<&Path>) -> Result<String, String> {
+    let signature = signature_of(file);
+    let name = signature.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    if !signature.exists() {
+        return match allowed {
+            Some(_) => Err(format!("{name}: missing, the report is not signed")),
+            None => Ok(UNSIGNED.to_owned()),
+        };
+    }
+    match check(file, allowed) {
+        Ok(signer) => Ok(match signer.person {
+            Some(person) => format!("signed by {person} with {}", signer.key),
+            None => format!(
+                "signed with {}; --allowed-signers FILE names whose key it is",
+                signer.key
+            ),
+        }),
+        // A check that needs the missing program is a problem only if it was requested.
+        Err(SignError::Missing) if allowed.is_none() => Ok(format!("{name}: not checked: {}", SignError::Missing)),
+        Err(problem) => Err(format!("{name}: {problem}")),
+    }
+}
+
 /// Checks the signature of `file`; `allowed` is a file of permitted signers in OpenSSH's format.
 pub fn check(file: &Path, allowed: Option<&Path>) -> Result<Signer, SignError> {
     let signature = signature_of(file);

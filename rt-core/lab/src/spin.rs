@@ -4,7 +4,7 @@ use crate::compare::{self, CompareError};
 use crate::measure::{MeasureError, Setup, measure};
 use crate::summary::quantile_us;
 use hdrhistogram::Histogram;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_runtime::process::Options;
 use stylet_runtime::rt::clock::Wait;
@@ -44,7 +44,7 @@ impl std::str::FromStr for Spin {
 }
 
 /// One trial.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Trial {
     pub spin_us: u64,
     pub p50_us: Option<f64>,
@@ -54,7 +54,7 @@ pub struct Trial {
 }
 
 /// Spins tried, and the result.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SpinSearch {
     /// p50 and p99 that the loop must not exceed, microseconds.
     pub at_most_us: [f64; 2],
@@ -127,7 +127,7 @@ pub fn search(setup: &Setup, longest_us: u64, interrupted: &AtomicBool) -> Resul
             },
             interrupted,
         )
-        .map(|m| m.haptic.wake);
+        .map(|m| m.haptic.wake.whole);
         let Ok(ours) = ours.map_err(|why| failed = Some(why)) else {
             return false;
         };

@@ -1,7 +1,7 @@
 //! Tests whether a run was stationary: Kolmogorov-Smirnov tests on wake-ups that were thinned until independent.
 
 use crate::sample::PARTS;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Probability below which a test rejects.
 pub const LEVEL: f64 = 0.01;
@@ -13,9 +13,9 @@ const LAGS: usize = 5;
 const NORMAL_1_PERCENT: f64 = 2.575_8;
 
 /// One test with its figure.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TestResult {
-    pub name: &'static str,
+    pub name: String,
     /// Largest distance between two distribution functions.
     pub distance: f64,
     pub p: f64,
@@ -36,7 +36,7 @@ impl TestResult {
 }
 
 /// Result of the tests.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Stationarity {
     /// Ticks between the compared values.
     pub every: u64,
@@ -164,7 +164,11 @@ fn two_samples(name: &'static str, a: &[f64], b: &[f64]) -> TestResult {
     } else {
         kolmogorov(distance, n * m / (n + m))
     };
-    TestResult { name, distance, p }
+    TestResult {
+        name: name.to_owned(),
+        distance,
+        p,
+    }
 }
 
 /// Returns the probability of at least this distance; `n` values, or n m / (n + m) of two samples (Stephens 1970).

@@ -1,13 +1,13 @@
 //! Limits, and their outcome in a measurement: pass, fail, or not measurable, each with its evidence.
 
-use crate::collect::LoopTiming;
-use crate::measure::{Measured, switches_beyond_sleep};
+use crate::measure::LoopCounts;
 use crate::provenance::stiffness_margin_n_per_m;
+use crate::raw::Raw;
 use crate::summary::{needed, quantile_us};
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use stylet_runtime::process::LoopReport;
+use stylet_report::parts::duration;
 use stylet_shm_schema::ProblemList;
 
 /// Reading that a limit applies to.
@@ -145,6 +145,9 @@ pub enum Outcome {
     Pass,
     #[serde(rename = "NOT MEASURABLE")]
     NotMeasurable,
+    /// A tail beyond its limit where the environment may be the cause.
+    #[serde(rename = "OVER THE LIMIT, CAUSE UNDECIDED")]
+    Undecided,
     #[serde(rename = "FAIL")]
     Fail,
 }
@@ -155,6 +158,7 @@ impl Outcome {
             Self::Pass => "PASS",
             Self::Fail => "FAIL",
             Self::NotMeasurable => "NOT MEASURABLE",
+            Self::Undecided => "OVER THE LIMIT, CAUSE UNDECIDED",
         }
     }
 
@@ -163,50 +167,61 @@ impl Outcome {
         match self {
             Self::Pass => 0,
             Self::Fail => 1,
-            Self::NotMeasurable => 2,
+            Self::NotMeasurable | Self::Undecided => 2,
         }
     }
 }
 
 /// One limit compared with the measured value.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LimitResult {
-    pub id: &'static str,
-    pub name: &'static str,
-    pub unit: &'static str,
+    pub id: String,
+    pub name: String,
+    pub unit: String,
     pub lower_bound: bool,
     pub limit: f64,
     pub value: Option<f64>,
     pub outcome: Outcome,
     pub evidence: String,
-    pub reason: &'static str,
+    pub reason: String,
+}
+
+/// Counts of a run that limits apply to.
+pub struct Counted<'a> {
+    /// The loops by name, the force loop first.
+    pub loops: Vec<(&'static str, &'a LoopCounts)>,
+    pub records: u64,
+    pub records_missing: u64,
+    pub insertions: u64,
+    pub faults: &'a [String],
+    pub measured_s: f64,
 }
 
 /// Compares every limit with the measurement; where the environment is not qualified, the tail of a distribution says
 /// nothing about this program.
-pub fn evaluate(limits: &Limits, measured: &Measured, period_ns: u64, qualified: bool) -> Vec<LimitResult> {
+pub fn evaluate(limits: &Limits, raw: &Raw, counted: &Counted, period_ns: u64, qualified: bool) -> Vec<LimitResult> {
     let evaluate_one = |spec: &LimitSpec| {
         let limit = limits[spec.name];
-        let (value, evidence) = read(spec.reading, measured, period_ns);
+        let (value, evidence) = read(spec.reading, raw, counted, period_ns);
         let met = value.map(|v| if spec.is_lower_bound() { v >= limit } else { v <= limit });
+        let unqualified = spec.is_tail() && !qualified;
         let (outcome, evidence) = match met {
             None => (Outcome::NotMeasurable, evidence),
-            Some(_) if spec.is_tail() && !qualified => {
-                (Outcome::NotMeasurable, format!("environment not qualified; {evidence}"))
-            }
+            Some(true) if unqualified => (Outcome::NotMeasurable, format!("environment not qualified; {evidence}")),
+            Some(false) if unqualified => (Outcome::Undecided, format!("environment not qualified; {evidence}")),
             Some(true) => (Outcome::Pass, evidence),
             Some(false) => (Outcome::Fail, evidence),
         };
         LimitResult {
-            id: spec.id,
-            name: spec.name,
-            unit: spec.unit,
+            id: spec.id.to_owned(),
+            name: spec.name.to_owned(),
+            unit: spec.unit.to_owned(),
             lower_bound: spec.is_lower_bound(),
             limit,
             value,
             outcome,
             evidence,
-            reason: spec.reason,
+            reason: spec.reason.to_owned(),
         }
     };
     LIMITS.iter().map(evaluate_one).collect()
@@ -219,8 +234,8 @@ pub fn overall(outcomes: impl Iterator<Item = Outcome>) -> Outcome {
 
 type Read = (Option<f64>, String);
 
-/// Returns a percentile with its basis; the maximum needs one sample.
-fn percentile(histogram: &Histogram<u64>, quantile: f64) -> Read {
+/// Returns a percentile with its basis; the maximum needs one sample. A run that is too short says how long it must be.
+fn percentile(histogram: &Histogram<u64>, quantile: f64, measured_s: f64) -> Read {
     let count = histogram.len();
     if quantile >= MAX {
         let max_us = (count > 0).then(|| histogram.max() as f64 / 1e3);
@@ -228,56 +243,56 @@ fn percentile(histogram: &Histogram<u64>, quantile: f64) -> Read {
     }
     match quantile_us(histogram, quantile) {
         Some(us) => (Some(us), format!("{count} samples")),
-        None => (None, format!("{count} samples, needs {}", needed(quantile))),
+        None => {
+            let needs = needed(quantile);
+            // At the rate of this run; without a sample nobody knows.
+            let run = (count > 0).then(|| duration(needs as f64 / count as f64 * measured_s));
+            let run = run.map_or(String::new(), |run| format!(": a run of {run}"));
+            (None, format!("{count} samples, needs {needs}{run}"))
+        }
     }
 }
 
-fn read(reading: Reading, m: &Measured, period_ns: u64) -> Read {
-    let (haptic, tissue) = (&m.haptic, &m.tissue);
-    let second = m.run.second.as_ref().zip(m.second.as_ref());
-    let second = second.map(|(run, timing)| ("second", run, timing));
-    let loops = [("haptic", &m.run.haptic, haptic), ("tissue", &m.run.tissue, tissue)];
-    let counted = |what: fn(&LoopReport, &LoopTiming) -> i64| -> Read {
-        let all = loops.into_iter().chain(second);
-        let counts: Vec<_> = all
-            .map(|(name, run, timing)| (name, what(run, timing), run.ticks))
+fn read(reading: Reading, raw: &Raw, m: &Counted, period_ns: u64) -> Read {
+    let force = |what: &str, q| percentile(&raw.get(&format!("haptic/{what}")), q, m.measured_s);
+    let counted = |what: fn(&LoopCounts) -> i64| -> Read {
+        let counts = || m.loops.iter().map(|(name, counts)| (name, what(counts), counts.ticks));
+        let said: Vec<String> = counts()
+            .map(|(name, n, ticks)| format!("{name} {n} in {ticks} ticks"))
             .collect();
-        let said = counts
-            .iter()
-            .map(|(name, n, ticks)| format!("{name} {n} in {ticks} ticks"));
-        (
-            Some(counts.iter().map(|c| c.1 as f64).sum()),
-            said.collect::<Vec<_>>().join(", "),
-        )
+        (Some(counts().map(|c| c.1 as f64).sum()), said.join(", "))
     };
-    let of_ticks = |n: u64| (Some(n as f64), format!("{} ticks", haptic.ticks));
+    let of_ticks = |n: fn(&LoopCounts) -> u64| {
+        let first = m.loops.first().map(|(_, counts)| n(counts) as f64);
+        (first, format!("{} ticks", raw.get("haptic/wake").len()))
+    };
     match reading {
-        Reading::Wake(q) => percentile(&haptic.wake, q),
-        Reading::Work(q) => percentile(&haptic.work, q),
-        Reading::Path(q) => percentile(&haptic.path, q),
-        Reading::Jitter(q) => percentile(&haptic.jitter, q),
-        Reading::Recording(q) => percentile(&haptic.recording, q),
-        Reading::TipToTissue(q) => percentile(&tissue.path, q),
-        Reading::TipToHost(q) => percentile(&m.host.tip_to_host, q),
+        Reading::Wake(q) => force("wake", q),
+        Reading::Work(q) => force("work", q),
+        Reading::Path(q) => force("path", q),
+        Reading::Jitter(q) => force("jitter", q),
+        Reading::Recording(q) => force("recording", q),
+        Reading::TipToTissue(q) => percentile(&raw.get("tissue/path"), q, m.measured_s),
+        Reading::TipToHost(q) => percentile(&raw.get("host/tip_to_host"), q, m.measured_s),
         Reading::StiffnessMargin(q) => {
-            let (delay_us, evidence) = percentile(&haptic.due_to_output, q);
+            let (delay_us, evidence) = force("due_to_output", q);
             let margin = delay_us.map(|us| stiffness_margin_n_per_m(period_ns, us * 1e3));
             let delay = delay_us.map_or(String::new(), |us| format!(", delay {us:.1} us"));
             (margin, format!("{evidence}{delay}"))
         }
-        Reading::Missed => of_ticks(haptic.missed),
-        Reading::Overruns => of_ticks(haptic.overruns),
-        Reading::HeapCalls => counted(|r, _| r.usage.heap_calls as i64),
-        Reading::PageFaults => counted(|r, _| r.usage.minor_faults + r.usage.major_faults),
-        Reading::ExtraSwitches => counted(|r, _| switches_beyond_sleep(r)),
+        Reading::Missed => of_ticks(|c| c.missed_deadlines),
+        Reading::Overruns => of_ticks(|c| c.overruns),
+        Reading::HeapCalls => counted(|c| c.usage.heap_calls as i64),
+        Reading::PageFaults => counted(|c| c.usage.minor_faults + c.usage.major_faults),
+        Reading::ExtraSwitches => counted(|c| c.voluntary_switches_beyond_sleep),
         Reading::RecordsMissing => (
-            Some(m.host.records_missing as f64),
-            format!("{} records seen by the host", m.host.records),
+            Some(m.records_missing as f64),
+            format!("{} records seen by the host", m.records),
         ),
         Reading::Faults => {
-            let insertions = format!("{} insertions", m.host.insertions);
-            let evidence = [&[insertions], m.host.faults.as_slice()].concat().join("; ");
-            (Some(m.host.faults.len() as f64), evidence)
+            let insertions = format!("{} insertions", m.insertions);
+            let evidence = [&[insertions], m.faults].concat().join("; ");
+            (Some(m.faults.len() as f64), evidence)
         }
     }
 }
@@ -322,9 +337,13 @@ mod tests {
         let of = |all: &[Outcome]| overall(all.iter().copied());
         assert_eq!(of(&[Pass, Pass]), Pass);
         assert_eq!(of(&[Pass, NotMeasurable]), NotMeasurable);
-        assert_eq!(of(&[NotMeasurable, Fail, Pass]), Fail);
+        assert_eq!(of(&[NotMeasurable, Undecided, Pass]), Undecided);
+        assert_eq!(of(&[NotMeasurable, Fail, Undecided, Pass]), Fail);
         assert_eq!(of(&[]), NotMeasurable);
-        assert_eq!([Pass, Fail, NotMeasurable].map(Outcome::exit_code), [0, 1, 2]);
+        assert_eq!(
+            [Pass, Fail, NotMeasurable, Undecided].map(Outcome::exit_code),
+            [0, 1, 2, 2]
+        );
     }
 
     #[test]
@@ -333,9 +352,10 @@ mod tests {
         for ns in 1..=999_u64 {
             h.record(ns * 1_000).expect("in range");
         }
-        assert!(percentile(&h, 0.99).0.is_none());
+        let (none, why) = percentile(&h, 0.99, 0.999);
+        assert!(none.is_none() && why.ends_with("needs 1000: a run of 1 s"), "{why}");
         h.record(1_000_000).expect("in range");
-        assert!(percentile(&h, 0.99).0.is_some());
-        assert!(percentile(&h, MAX).0.is_some_and(|us| (us - 1000.0).abs() < 1.0));
+        assert!(percentile(&h, 0.99, 0.999).0.is_some());
+        assert!(percentile(&h, MAX, 1.0).0.is_some_and(|us| (us - 1000.0).abs() < 1.0));
     }
 }

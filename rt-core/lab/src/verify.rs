@@ -1,9 +1,14 @@
-//! Verifies that a saved report is unaltered, its signature, and its programs.
+//! Verifies a saved report: its digests, every figure from the raw data, its signature, and its programs.
 
+mod again;
+mod stamp;
+
+use crate::campaign;
 use crate::disk::{self, DiskError};
 use crate::provenance::sha256;
-use crate::report::{JSON, NO_DIGEST};
-use crate::sign::{self, SignError};
+use crate::report::{JSON, OLD_SCHEMA, SCHEMA};
+use crate::sealed::{self, MISSING};
+use crate::sign;
 use clap::Args;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -12,7 +17,7 @@ use stylet_text::printable;
 /// What to verify.
 #[derive(Args, Clone, Debug)]
 pub struct VerifyArgs {
-    /// The folder of the report, or its report.json
+    /// The folder of a report or of a campaign, or its report.json
     pub report: PathBuf,
     /// Who may sign: OpenSSH's file of allowed signers, a line `NAME ssh-ed25519 KEY` for each. The report must then be
     /// signed
@@ -21,15 +26,26 @@ pub struct VerifyArgs {
     /// Program that the report must be of, rt-core or host-ui; may be given for both
     #[arg(long, value_name = "FILE")]
     pub binary: Vec<PathBuf>,
+    /// Challenge that the report must answer
+    #[arg(long, value_name = "TEXT")]
+    pub nonce: Option<String>,
+    /// Certificates of the authority that stamped report.json with the time (RFC 3161); the stamp is report.json.tsr, as
+    /// `openssl ts` and the authority made it
+    #[arg(long, value_name = "FILE")]
+    pub timestamp_ca: Option<PathBuf>,
 }
 
-/// Checks the report, and prints every problem; without one, the signer.
+/// Checks the report, and prints every problem; without one, the signer and what could not be checked.
 ///
 /// Returns 0 if the report is unaltered and meets the request, else 1.
 ///
 /// # Errors
 /// `report.json` or a named program cannot be read.
 pub fn run(args: &VerifyArgs) -> Result<u8, DiskError> {
+    if args.report.join(campaign::REPORT).exists() {
+        let checked = campaign::check(&args.report, args.allowed_signers.as_deref())?;
+        return Ok(said(&args.report.join(campaign::REPORT), checked.0, &checked.1));
+    }
     let file = if args.report.is_dir() {
         args.report.join(JSON)
     } else {
@@ -38,49 +54,89 @@ pub fn run(args: &VerifyArgs) -> Result<u8, DiskError> {
     let bytes = disk::read(&file)?;
     // Damaged bytes may not be text; the file then differs from its digest.
     let text = String::from_utf8_lossy(&bytes);
-    let folder = file.parent().unwrap_or(Path::new("."));
-    let mut problems = problems(&text, |name| std::fs::read(folder.join(name)).ok());
-    let mut notes = Vec::new();
-    match signature(&file, args.allowed_signers.as_deref()) {
-        Ok(note) => notes.push(note),
-        Err(problem) => problems.push(problem),
-    }
+    let Checked {
+        mut problems,
+        mut notes,
+    } = check(&file, &text, args.allowed_signers.as_deref());
+    // A report by itself can be read, not verified.
+    let missing = |note: &String| note.ends_with(MISSING);
+    problems.extend(notes.extract_if(.., |note| missing(note)));
     let report: Value = serde_json::from_str(&text).unwrap_or_default();
     for binary in &args.binary {
         problems.extend(other_program(&report, binary, &sha256(&disk::read(binary)?)));
     }
+    let answered = report["nonce"].as_str();
+    if let Some(asked) = args.nonce.as_deref().filter(|asked| answered != Some(*asked)) {
+        let answered = answered.map_or("none".to_owned(), |nonce| format!("{nonce:?}"));
+        problems.push(format!(
+            "{JSON}: not of this challenge: asked {asked:?}, the report answers {answered}"
+        ));
+    }
+    if let Some(ca) = &args.timestamp_ca {
+        match stamp::check(&file, ca) {
+            Ok(note) => notes.push(note),
+            Err(why) => problems.push(why.to_string()),
+        }
+    }
+    Ok(said(&file, problems, &notes))
+}
+
+/// Prints the problems, without one the notes; returns the exit code.
+fn said(file: &Path, problems: Vec<String>, notes: &[String]) -> u8 {
     for problem in &problems {
-        println!("{}", printable(&problem.to_string()));
+        println!("{}", printable(problem));
     }
     if problems.is_empty() {
         println!("{}: unaltered", file.display());
         notes.iter().for_each(|note| println!("{}", printable(note)));
     }
-    Ok(u8::from(!problems.is_empty()))
+    u8::from(!problems.is_empty())
 }
 
-/// Returns the signer of the report, or the problem with its signature.
-fn signature(file: &Path, allowed: Option<&Path>) -> Result<String, String> {
-    let signature = sign::signature_of(file);
-    let name = signature.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    if !signature.exists() {
-        return match allowed {
-            Some(_) => Err(format!("{name}: missing, the report is not signed")),
-            None => Ok("not signed".to_owned()),
-        };
+/// Outcome of all checks that need nothing but the folder of the report.
+#[derive(Debug, Default)]
+pub(crate) struct Checked {
+    pub problems: Vec<String>,
+    /// Signer, and what could not be checked.
+    pub notes: Vec<String>,
+}
+
+/// Note of a report whose figures nothing supports.
+pub(crate) const OLDER: &str = "of an older version: its figures cannot be computed again";
+
+/// Checks digests, figures and signature of the report `file` with the contents `text`.
+pub(crate) fn check(file: &Path, text: &str, allowed: Option<&Path>) -> Checked {
+    let folder = file.parent().unwrap_or(Path::new("."));
+    let read = |name: &str| disk::read(&folder.join(name)).ok();
+    let mut checked = Checked::default();
+    let (missing, altered): (Vec<_>, _) = sealed::problems(JSON, text, read)
+        .into_iter()
+        .partition(|p| p.ends_with(MISSING));
+    checked.problems = altered;
+    match schema(text).as_deref() {
+        Some(OLD_SCHEMA) => checked.notes.push(OLDER.to_owned()),
+        Some(SCHEMA) if missing.is_empty() => {
+            let again = again::check(text, read);
+            checked.problems.extend(again.problems);
+            checked.notes.extend(again.notes);
+        }
+        Some(SCHEMA) => {}
+        found => checked.problems.push(format!(
+            "{JSON}: schema {}, expected {SCHEMA:?}",
+            found.unwrap_or("of none")
+        )),
     }
-    match sign::check(file, allowed) {
-        Ok(signer) => Ok(match signer.person {
-            Some(person) => format!("signed by {person} with {}", signer.key),
-            None => format!(
-                "signed with {}; --allowed-signers FILE names whose key it is",
-                signer.key
-            ),
-        }),
-        // A check that needs the missing program is a problem only if it was requested.
-        Err(SignError::Missing) if allowed.is_none() => Ok(format!("{name}: not checked: {}", SignError::Missing)),
-        Err(problem) => Err(format!("{name}: {problem}")),
+    checked.notes.extend(missing);
+    match sign::signer(file, allowed) {
+        Ok(note) => checked.notes.push(note),
+        Err(problem) => checked.problems.push(problem),
     }
+    checked
+}
+
+fn schema(text: &str) -> Option<String> {
+    let report: Value = serde_json::from_str(text).ok()?;
+    Some(report["schema"].as_str()?.to_owned())
 }
 
 /// Returns the discrepancy if the report is not of the program `binary`.
@@ -105,44 +161,7 @@ fn other_program(report: &Value, binary: &Path, digest: &str) -> Option<String> 
     ))
 }
 
-/// Returns everything that was altered; `read` returns the contents of a file in the report's folder.
-pub(crate) fn problems(text: &str, read: impl Fn(&str) -> Option<Vec<u8>>) -> Vec<String> {
-    let Ok(report) = serde_json::from_str::<Value>(text) else {
-        return vec![format!("{JSON}: tampered with or damaged, it is not JSON")];
-    };
-    let digest = report["sha256"].as_str().unwrap_or_default();
-    if digest.len() != NO_DIGEST.len() || digest == NO_DIGEST {
-        return vec![format!("{JSON}: it carries no SHA-256")];
-    }
-    let mut problems = Vec::new();
-    let found = sha256(text.replacen(digest, NO_DIGEST, 1).as_bytes());
-    if found != digest {
-        problems.push(format!(
-            "{JSON}: tampered with: its SHA-256 is {found}, it says {digest}"
-        ));
-    }
-    for file in report["files"].as_array().into_iter().flatten() {
-        let (name, said) = (
-            file["name"].as_str().unwrap_or_default(),
-            file["sha256"].as_str().unwrap_or_default(),
-        );
-        let Some(bytes) = read(name) else {
-            problems.push(format!("{name}: missing"));
-            continue;
-        };
-        // The page shows the report's digest, which did not exist yet when the page's was computed.
-        let bare = match std::str::from_utf8(&bytes) {
-            Ok(page) => page.replacen(digest, NO_DIGEST, 1).into_bytes(),
-            Err(_) => bytes,
-        };
-        if sha256(&bare) != said {
-            problems.push(format!(
-                "{name}: tampered with: its SHA-256 is not the one that the report names"
-            ));
-        }
-    }
-    problems
-}
-
+#[cfg(test)]
+mod forgeries;
 #[cfg(test)]
 mod tests;

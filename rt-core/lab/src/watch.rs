@@ -1,12 +1,12 @@
 //! The kernel's counters of the cores during a measurement: frequency, steal time, interrupts served.
 
 use crate::machine::Machine;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Observations of one core over the run.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct CoreWatch {
     pub core: usize,
     pub lowest_mhz: Option<f64>,

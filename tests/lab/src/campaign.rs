@@ -63,10 +63,26 @@ fn a_campaign_killed_three_times_counts_no_second_twice() {
     let killed_at = measured_s(&out);
     assert!((6.0..12.0).contains(&killed_at), "{killed_at} s before the last start");
     let status = start(&file, &out).wait().expect("ours");
-    assert_eq!(status.code(), Some(0), "it is complete");
     let text = std::fs::read_to_string(out.join("campaign.json")).expect("a report");
     let report: Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!(report["complete"], true);
+    let verdict = match report["verdict"].as_str() {
+        Some("PASS") => 0,
+        Some("FAIL") => 1,
+        _ => 2,
+    };
+    assert_eq!(status.code(), Some(verdict), "the exit code is the verdict");
+    let verified = Command::new(program("rt-core"))
+        .arg("verify")
+        .arg(&out)
+        .output()
+        .expect("rt-core starts");
+    assert_eq!(
+        verified.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&verified.stdout)
+    );
     let total = report["measured_s"].as_f64().expect("a time");
     // A part may end half a second early, and a loop some ticks late.
     assert!((11.0..12.3).contains(&total), "{total} s of 12");
@@ -107,7 +123,7 @@ fn a_campaign_killed_three_times_counts_no_second_twice() {
             .contains("<svg")
     );
     // Once complete, it measures nothing more; another file for the same folder is refused.
-    assert_eq!(start(&file, &out).wait().expect("ours").code(), Some(0));
+    assert_eq!(start(&file, &out).wait().expect("ours").code(), Some(verdict));
     let again: Value =
         serde_json::from_str(&std::fs::read_to_string(out.join("campaign.json")).expect("a report")).expect("JSON");
     assert_eq!(

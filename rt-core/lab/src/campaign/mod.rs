@@ -4,6 +4,7 @@
 //! session, and writes its data every minute (`session`). One report covers all sessions (`report`, `page`). Data after
 //! the last checkpoint of a killed session is discarded and measured again.
 
+mod chain;
 mod page;
 mod plan;
 mod report;
@@ -14,8 +15,15 @@ mod tests;
 use crate::disk::{self, DiskError};
 use crate::measure::{Checkpoints, MeasureError, Setup, measure, period_ns};
 use crate::plots::DrawError;
+use crate::provenance::{COMMIT, sha256};
+use crate::report::FileDigest;
+use crate::sealed::{self, seal};
+use crate::sign::{self, SignError};
+use crate::whose::{WhoseArgs, WhoseError};
+use chain::{CHAIN, Chain};
 use clap::Args;
 use plan::{Plan, PlanProblem};
+use report::{About, CampaignReport, Said};
 use session::{FORCE, Store};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -27,6 +35,9 @@ use stylet_runtime::rt::clock::Wait;
 use stylet_shm_schema::ProblemList;
 use stylet_write::write_whole;
 
+/// Report of a campaign.
+pub(crate) const REPORT: &str = "campaign.json";
+const PAGE: &str = "campaign.html";
 const COPY: &str = "campaign.toml";
 const LOCK: &str = "campaign.lock";
 
@@ -37,8 +48,9 @@ pub struct CampaignArgs {
     ///
     /// A part needs its duration ("8h"). Its load is one of those of `rt-core latency`, without one nothing; its rate
     /// is in Hz, by default 1000; its spin_us is 0 by default. Before the parts, `repeat` measures the whole list so
-    /// many times, `window` is the time of which the worst is drawn, by default "5m", and `checkpoint` how often all
-    /// that was measured is written, by default "1m". The same command continues a campaign that was interrupted,
+    /// many times, `window` is the time of which the worst is drawn, by default "5m", `checkpoint` is how often all
+    /// that was measured is written, by default "1m", and `limits` are those other than their defaults, as
+    /// "wake_p99_us=300". The same command continues a campaign that was interrupted,
     /// killed, or ended by a restart of the PC; a line `@reboot` in a crontab does so by itself.
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
@@ -48,6 +60,11 @@ pub struct CampaignArgs {
     /// Make the report of what there is so far, and measure nothing
     #[arg(long)]
     pub report: bool,
+    /// Challenge of whoever asks for the campaign: it stands in the report, and its signature covers it
+    #[arg(long, value_name = "TEXT")]
+    pub nonce: Option<String>,
+    #[command(flatten)]
+    whose: WhoseArgs,
     #[command(flatten)]
     real_time: RealTimeArgs,
 }
@@ -80,6 +97,20 @@ pub enum CampaignError {
         /// Problem with it.
         why: String,
     },
+    /// Checkpoints that are not those which were measured.
+    #[error("{}: {}", .folder.display(), .problems.join("; "))]
+    Altered {
+        /// The folder.
+        folder: PathBuf,
+        /// Every problem.
+        problems: Vec<String>,
+    },
+    /// Operator, site, device or key are invalid.
+    #[error(transparent)]
+    Whose(#[from] WhoseError),
+    /// The report cannot be signed.
+    #[error(transparent)]
+    Sign(#[from] SignError),
     /// Options of the run.
     #[error(transparent)]
     Options(#[from] OptionsError),
@@ -91,11 +122,13 @@ pub enum CampaignError {
     Draw(#[from] DrawError),
 }
 
-/// Measures what is left and writes the report; 0 when the campaign is complete, 2 when it was interrupted before.
+/// Measures what is left and writes the report; returns the verdict (0 pass, 1 fail, 2 open), or 2 when the campaign was
+/// interrupted.
 ///
 /// # Errors
-/// The file or a checkpoint is invalid, the folder is of another campaign or in use, or the loops do not run.
+/// The file or a checkpoint is invalid, the folder is of another campaign, altered or in use, or the loops do not run.
 pub fn run(args: &CampaignArgs, interrupted: &AtomicBool) -> Result<u8, CampaignError> {
+    let whose = args.whose.read()?;
     let text = disk::read_text(&args.file)?;
     let plan = Plan::of(&text)?;
     disk::make(&args.out)?;
@@ -124,20 +157,104 @@ pub fn run(args: &CampaignArgs, interrupted: &AtomicBool) -> Result<u8, Campaign
             }
         }
     }
-    let report = report::report(&plan, &store)?;
+    refuse_altered(&store)?;
+    let mut report = report::report(&plan, &store, About::this(whose.clone(), args.nonce.clone()))?;
     println!(
         "{} of {} measured in {} sessions",
         time(report.measured_s),
         time(report.planned_s),
         report.sessions.len()
     );
-    disk::write_report(&args.out, "campaign", &report, &page::page(&report)?)?;
+    let file = args.out.join(REPORT);
+    let signature = sign::signature_of(&file);
+    if signature.exists() {
+        println!("{}: signed already, and not written again", file.display());
+    } else {
+        write(&args.out, &mut report)?;
+        if let Some(key) = whose.sign.filter(|_| report.complete) {
+            println!("{}", sign::sign(&file, &key)?.display());
+        }
+    }
     if report.complete {
-        return Ok(0);
+        println!("verdict: {}", report.verdict.words());
+        return Ok(report.verdict.exit_code());
     }
     println!("not complete: the same command continues it");
     Ok(2)
 }
+
+/// Fails if a checkpoint is not as it was written.
+fn refuse_altered(store: &Store) -> Result<(), CampaignError> {
+    let problems = Chain::read(&store.folder)?.problems(&store.files()?);
+    if problems.is_empty() {
+        return Ok(());
+    }
+    Err(CampaignError::Altered {
+        folder: store.folder.clone(),
+        problems,
+    })
+}
+
+/// Writes page and report with all digests.
+fn write(folder: &Path, report: &mut CampaignReport) -> Result<(), CampaignError> {
+    let page = page::page(report)?;
+    write_whole(&folder.join(PAGE), page.as_bytes()).map_err(DiskError::from)?;
+    for name in [COPY, CHAIN, PAGE] {
+        let bytes = disk::read(&folder.join(name)).unwrap_or_default();
+        report.files.push(FileDigest {
+            name: name.to_owned(),
+            sha256: sha256(&bytes),
+        });
+    }
+    let text = seal(&text_of(report)?);
+    write_whole(&folder.join(REPORT), text.as_bytes()).map_err(DiskError::from)?;
+    println!("{}\n{}", folder.join(PAGE).display(), folder.join(REPORT).display());
+    Ok(())
+}
+
+fn text_of(report: &CampaignReport) -> Result<String, DiskError> {
+    Ok(serde_json::to_string_pretty(report)? + "\n")
+}
+
+/// Checks a finished campaign: digests, the chain, every figure, and the signature; returns problems and notes.
+pub(crate) fn check(folder: &Path, allowed: Option<&Path>) -> Result<(Vec<String>, Vec<String>), DiskError> {
+    let file = folder.join(REPORT);
+    let text = disk::read_text(&file)?;
+    let mut problems = sealed::problems(REPORT, &text, |name| disk::read(&folder.join(name)).ok());
+    if let Err(why) = again(folder, &text, &mut problems) {
+        problems.push(why.to_string());
+    }
+    let mut notes = Vec::new();
+    match sign::signer(&file, allowed) {
+        Ok(note) => notes.push(note),
+        Err(problem) => problems.push(problem),
+    }
+    Ok((problems, notes))
+}
+
+/// Computes the report again from the checkpoints.
+fn again(folder: &Path, text: &str, problems: &mut Vec<String>) -> Result<(), CampaignError> {
+    let store = Store {
+        folder: folder.to_owned(),
+    };
+    problems.extend(Chain::read(folder)?.problems(&store.files()?));
+    let plan = Plan::of(&disk::read_text(&folder.join(COPY))?)?;
+    let said: Said = serde_json::from_str(text).map_err(|e| CampaignError::Checkpoint {
+        path: folder.join(REPORT),
+        why: format!("not the report of a campaign: {e}"),
+    })?;
+    let mut again = report::report(&plan, &store, said.about.clone())?;
+    (again.sha256, again.files) = (said.sha256, said.files);
+    problems.extend(sealed::lines(REPORT, text, &text_of(&again)?).into_iter().take(NAMED));
+    if again.about.commit == COMMIT {
+        let page = disk::read_text(&folder.join(PAGE))?;
+        problems.extend(sealed::other_page(PAGE, &page, &page::page(&again)?));
+    }
+    Ok(())
+}
+
+/// Most lines that are named.
+const NAMED: usize = 8;
 
 /// Formats seconds, such as `7h 5m 10s`.
 fn time(seconds: f64) -> String {

@@ -3,6 +3,7 @@
 use super::report::{CampaignReport, LoopOfPart, PartReport};
 use super::time;
 use crate::html::times::time_table;
+use crate::html::{badge, limits, whose};
 use crate::plots::{self, DrawError, MaximaPart};
 use maud::{Markup, PreEscaped, html};
 use stylet_report::parts::{Column, cell, num, or_na, table};
@@ -16,13 +17,15 @@ pub fn page(r: &CampaignReport) -> Result<String, DrawError> {
     );
     let pictures = pictures(r)?;
     let main = html! {
-        header { h1 { (title) } }
+        header { h1 { (title) } (badge(r.verdict)) }
         p class="sub" {
             b { (time(r.measured_s)) } " of " (time(r.planned_s)) " measured in " (r.sessions.len()) " sessions. "
-            (r.made_at) ", " (r.program) "."
+            (r.about.made_at) ", " (r.about.program) "."
         }
+        @if let Some(whose) = whose(&r.about.whose) { p class="sub" { (whose) } }
+        @if let Some(nonce) = &r.about.nonce { p class="sub" { "Answers the challenge " code { (nonce) } "." } }
         @if !r.complete { div class="warning" { strong { "Not complete." } " The same command continues it." } }
-        @if let Some(name) = &r.hypervisor {
+        @if let Some(name) = &r.about.hypervisor {
             div class="warning" {
                 strong { "Environment not qualified." }
                 " This is a virtual machine (" (name) "): the tail says more about the machine below than about this program."
@@ -37,7 +40,7 @@ pub fn page(r: &CampaignReport) -> Result<String, DrawError> {
         footer {
             "A session is what one start of the program measured without a break. Its file is replaced at each checkpoint; \
              what was measured after the last checkpoint of a session that was killed is not counted, and was measured \
-             again. Two sessions of the same moment are refused. Commit " code { (r.commit) } ", schema " (r.schema) "."
+             again. Two sessions of the same moment are refused. Last digest of the chain of checkpoints: " code { (r.chain) } ". Commit " code { (r.about.commit) } ", schema " (r.schema) "."
         }
     };
     Ok(stylet_report::page(&title, "", &main))
@@ -116,6 +119,7 @@ fn of_part(i: usize, part: &PartReport) -> Markup {
     let of = |l: &LoopOfPart| [l.wake.clone(), l.work.clone(), l.due_to_output.clone()];
     html! {
         h2 { "Part " (i + 1) ": " (part.part.name()) }
+        (limits(&part.limits))
         h3 { "Force loop" }
         (time_table(&of(&part.force)))
         h3 { "Tissue loop" }

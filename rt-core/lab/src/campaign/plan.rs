@@ -4,6 +4,7 @@ use crate::args::{duration_ns, longest_spin_ns};
 use crate::load::Load;
 use crate::machine::Machine;
 use crate::measure::period_ns;
+use crate::verdict::{self, LimitsError};
 use serde::{Deserialize, Deserializer, Serialize};
 use stylet_shm_schema::ProblemList;
 
@@ -33,6 +34,9 @@ pub struct Plan {
     pub window_ns: u64,
     #[serde(rename = "checkpoint", default = "a_minute", deserialize_with = "time")]
     pub checkpoint_ns: u64,
+    /// Limits other than their defaults, as `NAME=VALUE`.
+    #[serde(default)]
+    pub limits: Vec<String>,
     #[serde(rename = "part")]
     pub parts: Vec<Part>,
 }
@@ -66,6 +70,9 @@ pub enum PlanProblem {
     /// No part, or too many repetitions of all.
     #[error("expected at least one [[part]], and repeat between 1 and 1000")]
     Parts,
+    /// Limits that do not exist.
+    #[error(transparent)]
+    Limits(#[from] LimitsError),
     /// A rate that the loop cannot have.
     #[error("part {part}: rate = {hz}: expected 500 to 10000 Hz")]
     Rate {
@@ -104,6 +111,11 @@ impl Plan {
                 problems.push(PlanProblem::Spin { part, spin_us, most_us });
             }
         }
+        problems.extend(
+            verdict::limits(period_ns(kilohertz()), &once.limits)
+                .err()
+                .map(PlanProblem::from),
+        );
         ProblemList::check(problems)?;
         Ok(Self {
             parts: once.parts.repeat(once.repeat),

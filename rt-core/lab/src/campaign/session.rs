@@ -1,17 +1,18 @@
 //! Measurements of a session, as written at each checkpoint and read again.
 
 use super::CampaignError;
+use super::chain::Chain;
 use super::plan::Part;
 use crate::collect::LoopTiming;
 use crate::disk::{self, DiskError};
 use crate::provenance::sha256;
 use crate::report::{self, WindowRow};
-use crate::sample::histogram;
+use crate::sample::{Batched, histogram};
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Mutex;
-use stylet_write::{WriteError, write_whole};
+use stylet_write::write_whole;
 
 const SCHEMA: &str = "stylet.campaign-session/1";
 /// Shortfall with which a part still counts as complete: the run ends between two ticks.
@@ -30,12 +31,18 @@ impl Bins {
         Self(bins.map(|b| (b.value_iterated_to(), b.count_at_value())).collect())
     }
 
-    /// Adds them to a histogram.
-    fn add_to(&self, h: &mut Histogram<u64>) {
+    /// Returns them as a histogram.
+    pub fn histogram(&self) -> Histogram<u64> {
+        let mut h = histogram();
         for &(value, count) in &self.0 {
             h.saturating_record_n(value, count);
         }
+        h
     }
+}
+
+fn of_parts(batched: &Batched) -> Vec<Bins> {
+    batched.parts.iter().map(Bins::of).collect()
 }
 
 /// One loop of one session.
@@ -55,13 +62,39 @@ pub struct SessionRecord {
     pub missed: u64,
     pub overruns: u64,
     pub unmeasured: u64,
-    pub wake: Bins,
-    pub work: Bins,
-    pub due_to_output: Bins,
+    /// Histograms of equal parts of the session, here and below.
+    pub wake: Vec<Bins>,
+    pub work: Vec<Bins>,
+    pub due_to_output: Vec<Bins>,
     pub maxima: Vec<WindowRow>,
 }
 
+fn file_name(part: usize, session: usize, name: &str) -> String {
+    format!("part-{part:03}-session-{session:03}-{name}.json")
+}
+
 impl SessionRecord {
+    /// Checks that histograms and windows tell of the same ticks.
+    fn consistent(&self) -> Result<(), String> {
+        let in_windows = |of: fn(&WindowRow) -> u32| self.maxima.iter().map(|m| u64::from(of(m))).sum::<u64>();
+        let in_bins = |bins: &[Bins]| bins.iter().map(|b| b.histogram().len()).sum::<u64>();
+        let (wake, work) = (in_bins(&self.wake), in_bins(&self.work));
+        for (what, says, is) in [
+            ("ticks", self.ticks, wake),
+            ("ticks", self.ticks, work),
+            ("ticks", self.ticks, in_windows(|m| m.ticks)),
+            ("missed", self.missed, in_windows(|m| m.missed)),
+            ("overruns", self.overruns, in_windows(|m| m.overruns)),
+        ] {
+            if says != is {
+                return Err(format!(
+                    "contradicts itself: {what} {says}, its histograms and windows have {is}"
+                ));
+            }
+        }
+        Ok(())
+    }
+
     /// Returns whether both measured the same moment.
     pub fn overlaps(&self, other: &Self) -> bool {
         let end = |r: &Self| r.first_due_ns + r.measured_ns;
@@ -85,17 +118,25 @@ pub struct Store {
 impl Store {
     /// Returns every session of one loop, in the order in which they were measured.
     pub fn records(&self, name: &str) -> Result<Vec<Kept>, CampaignError> {
-        let ending = format!("-{name}.json");
+        let names = self.files()?.into_iter();
+        names
+            .filter(|n| n.ends_with(&format!("-{name}.json")))
+            .map(|file| self.record(file, name))
+            .collect()
+    }
+
+    /// Returns the names of all checkpoints.
+    pub fn files(&self) -> Result<Vec<String>, DiskError> {
         let entries = std::fs::read_dir(&self.folder).map_err(DiskError::read(&self.folder))?;
         let names = entries.flatten().map(|e| e.file_name().to_string_lossy().into_owned());
         let mut names: Vec<String> = names
-            .filter(|n| n.starts_with("part-") && n.ends_with(&ending))
+            .filter(|n| n.starts_with("part-") && n.ends_with(".json"))
             .collect();
         names.sort();
-        names.into_iter().map(|file| self.record(file)).collect()
+        Ok(names)
     }
 
-    fn record(&self, file: String) -> Result<Kept, CampaignError> {
+    fn record(&self, file: String, name: &str) -> Result<Kept, CampaignError> {
         let path = self.folder.join(&file);
         let text = disk::read_text(&path)?;
         let invalid = |why: String| CampaignError::Checkpoint {
@@ -107,6 +148,11 @@ impl Store {
         if record.schema != SCHEMA {
             return Err(invalid(format!("expected schema {SCHEMA}, found {:?}", record.schema)));
         }
+        let expected = file_name(record.part, record.session, name);
+        if file != expected {
+            return Err(invalid(format!("the checkpoint {expected} under another name")));
+        }
+        record.consistent().map_err(invalid)?;
         Ok(Kept {
             file,
             sha256: sha256(text.as_bytes()),
@@ -126,6 +172,8 @@ impl Store {
 
     /// Returns a writer of the next session of a part.
     pub fn begin(&self, part: usize) -> Result<Writer, CampaignError> {
+        let mut chain = Chain::read(&self.folder)?;
+        chain.settle()?;
         let all = self.records(FORCE)?;
         let before = all
             .iter()
@@ -136,6 +184,7 @@ impl Store {
             folder: self.folder.clone(),
             part,
             session: before.max().unwrap_or(0),
+            chain: Mutex::new(chain),
             boot: boot.trim().to_owned(),
             began_s: jiff::Timestamp::now().as_duration().as_secs_f64(),
             failure: Mutex::new(None),
@@ -150,7 +199,8 @@ pub struct Writer {
     session: usize,
     boot: String,
     began_s: f64,
-    failure: Mutex<Option<WriteError>>,
+    chain: Mutex<Chain>,
+    failure: Mutex<Option<DiskError>>,
 }
 
 impl Writer {
@@ -160,11 +210,12 @@ impl Writer {
             return;
         }
         let record = self.record(timing, window_ns);
-        let path = self
-            .folder
-            .join(format!("part-{:03}-session-{:03}-{name}.json", self.part, self.session));
+        let file = file_name(self.part, self.session, name);
         let text = serde_json::to_string(&record).unwrap_or_default();
-        if let Err(why) = write_whole(&path, text.as_bytes()) {
+        let mut chain = self.chain.lock().unwrap_or_else(|e| e.into_inner());
+        let linked = chain.append(&file, sha256(text.as_bytes()));
+        let written = linked.and_then(|()| Ok(write_whole(&self.folder.join(&file), text.as_bytes())?));
+        if let Err(why) = written {
             // The measurement continues: the next checkpoint may succeed.
             *self.failure.lock().unwrap_or_else(|e| e.into_inner()) = Some(why);
         }
@@ -183,9 +234,9 @@ impl Writer {
             missed: timing.missed,
             overruns: timing.overruns,
             unmeasured: timing.lost,
-            wake: Bins::of(&timing.wake),
-            work: Bins::of(&timing.work),
-            due_to_output: Bins::of(&timing.due_to_output),
+            wake: of_parts(&timing.wake),
+            work: of_parts(&timing.work),
+            due_to_output: of_parts(&timing.due_to_output),
             maxima: report::window_rows(timing, window_ns, self.began_s),
         }
     }
@@ -193,13 +244,6 @@ impl Writer {
     /// Returns the reason why a checkpoint could not be written.
     pub fn ended(self) -> Result<(), DiskError> {
         let failure = self.failure.into_inner().unwrap_or_else(|e| e.into_inner());
-        failure.map_or(Ok(()), |why| Err(why.into()))
+        failure.map_or(Ok(()), Err)
     }
-}
-
-/// Joins all of `bins` into one histogram.
-pub fn join<'a>(bins: impl Iterator<Item = &'a Bins>) -> Histogram<u64> {
-    let mut joined = histogram();
-    bins.for_each(|b| b.add_to(&mut joined));
-    joined
 }

@@ -23,7 +23,7 @@ pub struct Run {
 /// Reads `report.json` in `folder`. An altered one is refused.
 pub fn read(folder: &Path) -> Result<Run, NotCounted> {
     let file = folder.join(JSON);
-    let report = saved::read(&file)?;
+    let report = saved::read(&file, None)?;
     let p = &report.protocol;
     let limits = report.verdict.limits.into_iter();
     Ok(Run {

@@ -4,7 +4,8 @@ use super::runs;
 use super::tables::TABLES;
 use super::{credibility, page};
 use crate::provenance::sha256;
-use crate::report::{NO_DIGEST, SCHEMA};
+use crate::report::OLD_SCHEMA;
+use crate::sealed::NO_DIGEST;
 use crate::verdict::LIMITS;
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -92,7 +93,7 @@ fn outcomes_stand_next_to_requirements_and_altered_runs_are_refused() {
     let folder = std::env::temp_dir().join(format!("stylet-credibility-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("made");
     let report = json!({
-        "schema": SCHEMA, "sha256": NO_DIGEST, "made_at": "", "program": "", "commit": "",
+        "schema": OLD_SCHEMA, "sha256": NO_DIGEST, "made_at": "", "program": "", "commit": "",
         "protocol": {"scene": "paper", "load": "none", "rate_hz": 1000.0, "spin_us": 0, "measured_s": 60.0},
         "verdict": {"overall": "FAIL", "limits": [{"id": "REQ-LAT-002", "name": "wake_p99_us", "outcome": "FAIL"}]},
         "haptic": {"times": [], "counts": {"missed_deadlines": 0}}

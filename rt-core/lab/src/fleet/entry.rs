@@ -28,8 +28,9 @@ pub struct Entry {
 /// Values that differ from run to run without meaning, or that identify the PC.
 const OWN: [&str; 3] = ["memory lock", "PC: name", "PC: serial number"];
 
-pub fn read(file: &Path) -> Result<Entry, NotCounted> {
-    let report = saved::read(file)?;
+/// Reads a report; `allowed` are the people who may sign.
+pub fn read(file: &Path, allowed: Option<&Path>) -> Result<Entry, NotCounted> {
+    let report = saved::read(file, allowed)?;
     let named = report.facts.iter().find(|f| f.group == "PC" && f.name == "name");
     let named = named.map(|f| f.value.clone()).filter(|name| name != "not reported");
     let above = file

@@ -55,7 +55,11 @@ fn counts(pcs: &[Pc], grown: usize) -> Markup {
     let all = [
         ("PC passes", "PCs pass", with(Outcome::Pass)),
         ("PC fails", "PCs fail", with(Outcome::Fail)),
-        ("PC not measurable", "PCs not measurable", with(Outcome::NotMeasurable)),
+        (
+            "PC open",
+            "PCs open",
+            with(Outcome::NotMeasurable) + with(Outcome::Undecided),
+        ),
         ("tail grew", "tails grew", grown),
     ];
     cards(all.map(|(one, more, count)| (html! { b { (count) } }, cell(if count == 1 { one } else { more }))))
@@ -68,7 +72,7 @@ fn overview(pcs: &[Pc]) -> Markup {
         let kernel = e.machine.get("Kernel: version").map_or("", |v| kernel_release(v));
         vec![
             badge(e.outcome()),
-            html! { b { (pc.name) } br; span class="faint" { (e.report.made_at) } },
+            html! { b { (pc.name) } br; span class="faint" { (e.report.made_at) br; (e.report.notes.join("; ")) } },
             us(e, "p50"),
             us(e, "p99"),
             us(e, "p99.9"),

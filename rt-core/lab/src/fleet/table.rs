@@ -4,7 +4,7 @@ use super::entry::Entry;
 use std::fmt::Write;
 
 const HEAD: &str = "pc,made_at,verdict,protocol,measured_s,wake_p50_us,wake_p99_us,wake_p999_us,wake_p999_low_us,wake_p999_high_us,\
-                    wake_max_us,missed_deadlines,failed_limits,operator,site,kernel,firmware,program,report\r\n";
+                    wake_max_us,missed_deadlines,failed_limits,operator,site,kernel,firmware,program,verified,report\r\n";
 
 pub fn csv(entries: &[Entry]) -> String {
     let mut all = HEAD.to_owned();
@@ -33,6 +33,7 @@ pub fn csv(entries: &[Entry]) -> String {
             machine("Kernel: version"),
             machine("Processor: firmware"),
             machine("Program: version"),
+            report.notes.join("; "),
             e.path.clone(),
         ];
         let row: Vec<String> = cells.iter().map(|cell| quoted(cell)).collect();
@@ -61,6 +62,6 @@ mod tests {
             ["plain", "a, b", "the \"old\" one", "=1+1", "-5"].map(quoted),
             ["plain", "\"a, b\"", "\"the \"\"old\"\" one\"", "'=1+1", "-5"]
         );
-        assert_eq!(HEAD.split(',').count(), 19);
+        assert_eq!(HEAD.split(',').count(), 20);
     }
 }

@@ -75,7 +75,7 @@ pub fn stiffness(r: &Report) -> Markup {
     let rows: Vec<Vec<Markup>> = s
         .margins
         .iter()
-        .map(|m| vec![cell(m.at), or_na(m.delay_us), or_na(m.k_max_n_per_m.map(|k| k / 1e3))])
+        .map(|m| vec![cell(&m.at), or_na(m.delay_us), or_na(m.k_max_n_per_m.map(|k| k / 1e3))])
         .collect();
     html! {
         h2 { "What the delay costs the hand" }
@@ -112,9 +112,9 @@ pub fn method(r: &Report) -> Markup {
             "The run's own force loop, tissue loop and bridge, with the simulated device and a script that inserts and retracts \
              the needle every 4 s. The first " (num(r.protocol.warm_up_s)) " s are not recorded. Wake-up: clock read right after \
              the sleep, less the due time on the ideal grid. Missed deadline: a grid point that was skipped. Overrun: a tick that \
-             ended after the next was due. A percentile needs ten samples beyond it; below it stands its 95 % interval between two \
-             order statistics (binomial), which holds for any distribution of times that do not depend on each other. Values are \
-             known to 0.1 %. This report is \
+             ended after the next was due. A percentile needs ten samples beyond it; below it stands its 95 % interval, from how \
+             far eight equal parts of the run differ (batch means): it holds for wake-ups that depend on each other over less than a \
+             part, and not from run to run. Values are known to 0.1 %. This report is \
              evidence for whoever assesses the machine; it claims no conformity with any standard."
         }
         p class="faint" {

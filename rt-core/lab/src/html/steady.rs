@@ -11,7 +11,7 @@ pub fn steady(r: &Report) -> Markup {
     let row = |t: &TestResult| {
         let met = html! { @if t.rejects() { b { "no" } } @else { "yes" } };
         vec![
-            cell(t.name),
+            cell(&t.name),
             cell(format!("{:.3}", t.distance)),
             cell(format!("{:.1e}", t.p)),
             met,

@@ -76,7 +76,7 @@ pub fn comparison(r: &Report) -> Markup {
     let median = c.median_ratio.iter().flat_map(|m| [cell(""), cell(""), ratio(m)]);
     rows.push([html! { b { "median" } }].into_iter().chain(median).collect());
     let mut head = vec![cell("round")];
-    for name in c.names {
+    for name in &c.names {
         head.extend(c.against.sides().map(|whose| html! { (name) br; (whose) }));
         head.push(cell("ratio"));
     }

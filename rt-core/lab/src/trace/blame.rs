@@ -2,10 +2,10 @@
 
 use super::event::{Interruption, Task};
 use super::timeline::{Holder, Loop, Piece};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Kind of cause that delayed the loop's tick.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
     /// A thread of higher real-time priority.
@@ -39,23 +39,23 @@ pub enum Kind {
 }
 
 /// One cause, with all of its intervals.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cause {
     pub kind: Kind,
     /// The thread, interrupt or function by name.
     pub who: String,
     /// Number of the thread.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pid: Option<i32>,
     /// Returns the `SCHED_FIFO` priority behind the kernel's number; `None` for a normal thread.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub priority: Option<i32>,
     pub us: f64,
     pub times: u32,
     /// System call or work item in progress.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inside: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub woken_by: Option<String>,
 }
 

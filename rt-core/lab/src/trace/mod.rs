@@ -18,13 +18,13 @@ pub use blame::{Cause, Kind};
 pub use tracefs::{Instance, TraceError, keep};
 pub use witness::{Watched, watch};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Late ticks kept with their trace; a later one replaces the least late.
 pub const KEPT: usize = 32;
 
 /// Holder of the core over an interval, microseconds from the tick's deadline.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TracePiece {
     pub from_us: f64,
     pub us: f64,
@@ -32,14 +32,14 @@ pub struct TracePiece {
 }
 
 /// Count of something around a late tick.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Counted {
     pub what: String,
     pub times: u64,
 }
 
 /// A late tick with its causes.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Outlier {
     #[serde(skip)]
     pub due_ns: u64,
@@ -54,17 +54,17 @@ pub struct Outlier {
     pub counted: Vec<Counted>,
     pub counted_over_ms: f64,
     /// System management interrupts in the same time; absent if they cannot be counted.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub system_management_interrupts: Option<u64>,
     /// The trace around it.
     pub trace: Vec<TracePiece>,
 }
 
 /// Result of the trace of a run.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct TraceSection {
     /// Reason why there is no trace.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub absent: Option<String>,
     /// Lateness from which a tick counts: wake-up, or wake-up and own work together.
     pub over_us: f64,

@@ -1,25 +1,25 @@
 //! Every change is detected and named: a byte, a key, a program.
 
 use super::*;
+use crate::sealed::NO_DIGEST;
 
 const RAW: &[u8] = b"raw data";
 
 /// Returns a report with one page, digests and all.
 fn written() -> (String, Vec<u8>) {
-    let page = format!("<p>{NO_DIGEST}</p>");
+    let page = "<p>page</p>";
     let text = format!(
-        "{{\"sha256\": \"{NO_DIGEST}\", \"max_us\": 48.5, \"files\": [{{\"name\": \"raw\", \"sha256\": \"{}\"}}, \
+        "{{\"schema\": \"{OLD_SCHEMA}\", \"sha256\": \"{NO_DIGEST}\", \"max_us\": 48.5, \"files\": [{{\"name\": \"raw\", \"sha256\": \"{}\"}}, \
          {{\"name\": \"page\", \"sha256\": \"{}\"}}]}}",
         sha256(RAW),
         sha256(page.as_bytes())
     );
     let digest = sha256(text.as_bytes());
-    let fill = |s: &str| s.replacen(NO_DIGEST, &digest, 1);
-    (fill(&text), fill(&page).into_bytes())
+    (text.replacen(NO_DIGEST, &digest, 1), page.as_bytes().to_vec())
 }
 
 fn check(text: &str, raw: Option<&[u8]>, page: &[u8]) -> Vec<String> {
-    problems(text, |name| {
+    sealed::problems(JSON, text, |name| {
         if name == "raw" {
             raw.map(<[u8]>::to_vec)
         } else {
@@ -41,6 +41,18 @@ fn unaltered_report_passes_and_every_change_is_found() {
     assert!(check("{", None, b"")[0].contains("not JSON"));
 }
 
+/// Makes a key; `None` if ssh-keygen is not installed.
+pub fn key(folder: &Path, name: &str) -> Option<PathBuf> {
+    let made = std::process::Command::new("ssh-keygen")
+        .args(["-q", "-t", "ed25519", "-N", "", "-C", name, "-f"])
+        .arg(folder.join(name))
+        .status();
+    if made.is_err() {
+        println!("skipped: ssh-keygen is not installed");
+    }
+    made.ok().map(|_| folder.join(name))
+}
+
 /// A report in its own folder, with two keys: that of A. Meyer, a permitted signer, and another.
 struct Signed {
     folder: PathBuf,
@@ -53,15 +65,8 @@ impl Signed {
         let _ = std::fs::remove_dir_all(&folder);
         std::fs::create_dir_all(&folder).expect("the temporary folder can be written");
         let signed = Self { folder };
-        for key in ["meyer", "other"] {
-            let made = std::process::Command::new("ssh-keygen")
-                .args(["-q", "-t", "ed25519", "-N", "", "-C", key, "-f"])
-                .arg(signed.path(key))
-                .status();
-            if made.is_err() {
-                println!("skipped: ssh-keygen is not installed");
-                return None;
-            }
+        for name in ["meyer", "other"] {
+            key(&signed.folder, name)?;
         }
         let public = std::fs::read_to_string(signed.path("meyer.pub")).expect("a public key");
         std::fs::write(signed.path("allowed"), format!("a.meyer@site {public}")).expect("written");
@@ -75,13 +80,7 @@ impl Signed {
         let old = text_digest(&text);
         signed.put(JSON, text.replacen(&old, &digest, 1).as_bytes());
         signed.put("raw", RAW);
-        signed.put(
-            "page",
-            String::from_utf8(page)
-                .expect("text")
-                .replacen(&old, &digest, 1)
-                .as_bytes(),
-        );
+        signed.put("page", &page);
         sign::sign(&signed.path(JSON), &signed.path("meyer")).expect("the key signs");
         Some(signed)
     }
@@ -109,11 +108,13 @@ impl Signed {
             report: self.folder.clone(),
             allowed_signers: Some(self.path("allowed")),
             binary: Vec::new(),
+            nonce: None,
+            timestamp_ca: None,
         }
     }
 
     fn signature(&self) -> Result<String, String> {
-        signature(&self.path(JSON), Some(&self.path("allowed")))
+        sign::signer(&self.path(JSON), Some(&self.path("allowed")))
     }
 }
 
@@ -123,7 +124,7 @@ impl Drop for Signed {
     }
 }
 
-fn text_digest(text: &str) -> String {
+pub fn text_digest(text: &str) -> String {
     let report: Value = serde_json::from_str(text).expect("JSON");
     report["sha256"].as_str().expect("a digest").to_owned()
 }
@@ -148,7 +149,7 @@ fn signature_names_person_and_key() {
         "{said} {listed}"
     );
     assert_eq!(run(&signed.args()).expect("readable"), 0);
-    let unnamed = signature(&signed.path(JSON), None).expect("a good signature");
+    let unnamed = sign::signer(&signed.path(JSON), None).expect("a good signature");
     assert!(unnamed.starts_with("signed with ED25519 key SHA256:") && unnamed.contains("--allowed-signers"));
 }
 
@@ -157,7 +158,7 @@ fn one_flipped_byte_is_found_in_each_file_and_named() {
     let Some(signed) = Signed::new("flipped") else { return };
     let found = || {
         let bytes = std::fs::read(signed.path(JSON)).expect("a report");
-        problems(&String::from_utf8_lossy(&bytes), |name| {
+        sealed::problems(JSON, &String::from_utf8_lossy(&bytes), |name| {
             std::fs::read(signed.path(name)).ok()
         })
     };
@@ -197,7 +198,7 @@ fn wrong_key_and_missing_signature_are_named() {
     assert_eq!(run(&signed.args()).expect("readable"), 1);
     std::fs::remove_file(signed.path("report.json.sig")).expect("removed");
     assert!(signed.signature().expect_err("none").contains("not signed"));
-    assert_eq!(signature(&signed.path(JSON), None).as_deref(), Ok("not signed"));
+    assert_eq!(sign::signer(&signed.path(JSON), None).as_deref(), Ok("not signed"));
     // An invalid key.
     signed.put("meyer", b"no key");
     let why = sign::sign(&signed.path(JSON), &signed.path("meyer"))

@@ -1,6 +1,6 @@
 //! Requests real-time properties from the kernel for a thread, and reads back what was granted.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::io;
 use std::marker::PhantomData;
 use stylet_shm_schema::ThreadReport;
@@ -197,7 +197,7 @@ fn flush_denormals() {
 }
 
 /// Cost of a thread since it was armed.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Usage {
     /// Allocations, frees and reallocations.
     pub heap_calls: u64,
