@@ -59,7 +59,7 @@ report: ## Measure speed against error of every tissue model; writes benches/run
 
 causes: ## Inject ten causes of late ticks into measurements, and see which of them the trace names (as root, about a minute)
 	$(CARGO) build --profile quick --workspace --bin rt-core --bin stylet-bridge --bin stylet-lab
-	$(CARGO) test --profile quick -p stylet-tests-lab -- eight_of_ten --ignored --nocapture --test-threads=1
+	$(CARGO) test --profile quick -p stylet-tests-lab -- eight_of_ten without_a_trace --ignored --nocapture --test-threads=1
 
 ratios: build-release ## Measure the force loop beside cyclictest in alternating rounds and print the ratios, RATIOS_SECONDS (30) each (as root, quiet machine)
 	@docs/tools/need rt-tests python3

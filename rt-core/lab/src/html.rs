@@ -60,7 +60,7 @@ fn header(r: &Report) -> Markup {
         p class="sub" {
             "Scene " b { (p.scene) } ", force loop at " b { (num(p.rate_hz)) " Hz" } ", tissue at " (num(p.tissue_rate_hz))
             " Hz, " @if let Some(hz) = p.second_rate_hz { "second device at " (num(hz)) " Hz, " } "load " b { (p.load.name()) } " (" (p.load_is) "), " b { (num(p.measured_s.round())) " s" } " measured of " (num(p.duration_s)) " s asked for, spin " (p.spin_us) " \u{b5}s, "
-            (p.insertions) " insertions. " (r.made_at) ", " (r.program) "."
+            (p.insertions) " insertions; " (micro(&r.others.words())) ". " (r.made_at) ", " (r.program) "."
         }
         @if let Some(whose) = whose(&r.whose) { p class="sub" { (whose) } }
         @if let Some(nonce) = &r.nonce { p class="sub" { "Answers the challenge " code { (nonce) } "." } }

@@ -141,6 +141,7 @@ fn print_verdict(report: &Report) {
             j.unit
         );
     }
+    println!("{}", report.others.words());
     if !report.environment.qualified {
         println!("environment not qualified: {}", report.environment.evidence.join("; "));
     }

@@ -25,6 +25,7 @@ pub mod latency;
 pub mod load;
 mod machine;
 mod measure;
+mod others;
 mod plots;
 mod provenance;
 mod raw;

@@ -98,7 +98,7 @@ impl Load {
             .map(|(n, what)| format!("{n} {what}"))
             .collect();
         match said.is_empty() {
-            true => "nothing but the measurement".to_owned(),
+            true => "no load of this program".to_owned(),
             false => format!("processes of normal priority: {}", said.join(", ")),
         }
     }

@@ -2,7 +2,7 @@
 
 mod threads;
 
-pub use threads::Process;
+pub use threads::{Process, StatOfThread};
 
 use flate2::read::GzDecoder;
 use std::collections::{BTreeMap, BTreeSet};
@@ -248,6 +248,17 @@ impl Machine {
         // SAFETY: sysconf has no preconditions.
         let per_s = unsafe { libc::sysconf(libc::_SC_CLK_TCK) } as f64;
         Some(line.split_whitespace().nth(7)?.parse::<f64>().ok()? / per_s)
+    }
+
+    /// Returns the time of `core` since the start as the kernel counts it, busy and in all, in its own unit.
+    pub fn busy_of_all(&self, core: usize) -> Option<(u64, u64)> {
+        let text = self.text("proc/stat")?;
+        let start = format!("cpu{core} ");
+        let line = text.lines().find_map(|l| l.strip_prefix(&start))?;
+        // User, nice, system, idle, waiting, interrupts, softirqs, stolen; guests are part of user and nice.
+        let all: Vec<u64> = line.split_whitespace().take(8).map_while(|n| n.parse().ok()).collect();
+        let sum: u64 = all.iter().sum();
+        Some((sum - all.get(3)? - all.get(4)?, sum))
     }
 
     pub fn throttle(&self) -> Option<Throttle> {

@@ -5,6 +5,7 @@ use crate::gaps::{self, GapReport};
 use crate::host::{Host, HostError, HostReport, Script};
 use crate::load::{Load, LoadError, Running};
 use crate::machine::Machine;
+use crate::others::{self, Others};
 use crate::trace::{self, TraceSection, Watched};
 use crate::watch::{self, CoreWatch};
 use serde::{Deserialize, Serialize};
@@ -105,6 +106,7 @@ pub struct Measured {
     pub host: HostReport,
     pub gaps: GapReport,
     pub cores: Vec<CoreWatch>,
+    pub others: Others,
     pub trace: Option<TraceSection>,
     pub window_ns: u64,
     /// When it began, whole seconds since 1970.
@@ -225,7 +227,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         over_ns,
     });
     let instance = tracing.as_ref().map(|_| trace::Instance::start());
-    let (run, host, gaps, cores, trace, haptic, tissue, second) = std::thread::scope(|threads| {
+    let (run, host, gaps, cores, others, trace, haptic, tissue, second) = std::thread::scope(|threads| {
         let stop = &stop;
         let trace = tracing
             .as_ref()
@@ -257,6 +259,8 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         let second = second.map(|(timing, ring)| threads.spawn(move || timing.gather(ring)));
         let gaps = threads.spawn(move || gaps::watch(core, priority, stop));
         let machine = &machine;
+        let rank = if options.no_rt { 1 } else { options.haptic_priority };
+        let others = threads.spawn(move || others::watch(machine, options.haptic_core, rank, core, stop));
         let cores: Vec<_> = watched
             .into_iter()
             .flatten()
@@ -265,11 +269,22 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         let run = process::run_with(options, Some(probes), stop);
         stop.store(true, Ordering::Release);
         let cores: Vec<CoreWatch> = cores.into_iter().filter_map(|t| t.join().ok()).collect();
+        let others = others.join().unwrap_or_default();
         let (haptic, tissue) = (haptic.join(), tissue.join());
         let second = second.map(|thread| thread.join());
         // It ends when the force loop's gathering ends.
         let trace = trace.map(|started| started.map_or_else(Ok, |thread| thread.join()));
-        (run, host.join(), gaps.join(), cores, trace, haptic, tissue, second)
+        (
+            run,
+            host.join(),
+            gaps.join(),
+            cores,
+            others,
+            trace,
+            haptic,
+            tissue,
+            second,
+        )
     });
     // A window that could not open draws nothing.
     let loaded = load.ended();
@@ -287,6 +302,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         host: host.map_err(panicked)??,
         gaps: gaps.map_err(panicked)?,
         cores,
+        others,
         trace: trace.transpose().map_err(panicked)?,
         window_ns,
         began_s,

@@ -10,6 +10,7 @@ pub use derive::{contradictions, derive, limits_of};
 use crate::bound::MissBound;
 use crate::compare::Comparison;
 use crate::load::Load;
+use crate::others::Others;
 use crate::provenance::{Fact, ProgramDigest, Setting};
 use crate::spin::SpinSearch;
 use crate::stationary::Stationarity;
@@ -167,6 +168,7 @@ pub struct Report {
     pub stationarity: Stationarity,
     pub gaps: GapSection,
     pub cores: Vec<CoreWatch>,
+    pub others: Others,
     pub comparison: Option<Comparison>,
     /// Search for the spin; only with `--spin-us auto`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

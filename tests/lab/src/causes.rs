@@ -163,6 +163,45 @@ fn eight_of_ten_injected_causes_are_named() {
     assert!(named >= AT_LEAST, "{named} of {} were named", ALL.len());
 }
 
+/// Measures without a trace; returns time and cause of each of the latest wake-ups.
+fn untraced(name: &str, inject: Option<&Injection>) -> Vec<(f64, String)> {
+    let out = folder(name);
+    let mut child = Command::new(program("rt-core"))
+        .args(["latency", "--duration", "5s", "--out"])
+        .arg(&out)
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("rt-core starts");
+    let target = target(&child);
+    std::thread::sleep(Duration::from_millis(1_500));
+    if let Some(injection) = inject {
+        (injection.run)(target, Instant::now() + Duration::from_millis(3_000)).expect("root is all that it needs");
+    }
+    child.wait().expect("ours");
+    let text = std::fs::read_to_string(out.join("report.json")).expect("rt-core wrote its report");
+    let report: Value = serde_json::from_str(&text).expect("the report is JSON");
+    let late = report["latest_wake_ups"].as_array().expect("a list");
+    let read = |l: &Value| Some((l["at_s"].as_f64()?, l["cause"].as_str()?.to_owned()));
+    // Within the injection, which begins a second after the warm-up.
+    late.iter()
+        .filter_map(read)
+        .filter(|(at_s, _)| (1.3..3.7).contains(at_s))
+        .collect()
+}
+
+/// `make causes`.
+#[test]
+#[ignore = "depends on what else the machine does; run by `make causes`"]
+fn a_thread_of_higher_priority_is_named_without_a_trace() {
+    let is_named = |(_, cause): &&(f64, String)| cause.contains("of real-time priority");
+    let quiet = untraced("quiet", None);
+    assert_eq!(quiet.iter().filter(is_named).count(), 0, "{quiet:?}");
+    let disturbed = untraced("rival", Some(&ALL[0]));
+    let named = disturbed.iter().filter(is_named).count();
+    println!("{named} of {} named: {:?}", disturbed.len(), disturbed.first());
+    assert!(10 * named >= 9 * disturbed.len(), "{disturbed:?}");
+}
+
 /// SIGKILL in the middle: the keeper removes the instance.
 #[test]
 fn a_killed_measurement_leaves_no_trace_instance() {

@@ -183,6 +183,28 @@ fn altered_copied_and_foreign_files_are_not_counted_and_named() {
     }
 }
 
+/// A pipe in place of a report held the program for ever.
+#[test]
+fn pipes_and_broken_links_are_named() {
+    let folder = twenty("pipes");
+    for name in ["pipe", "link"] {
+        std::fs::create_dir_all(folder.0.join(name)).expect("made");
+    }
+    let made = std::process::Command::new("mkfifo")
+        .arg(folder.0.join("pipe").join(REPORT))
+        .status();
+    assert!(made.expect("mkfifo runs").success());
+    std::os::unix::fs::symlink("/nowhere/at/all", folder.0.join("link").join(REPORT)).expect("linked");
+    let (_, page, table) = fleet(&folder);
+    assert_eq!(table.lines().count(), 21);
+    let named = section(&page, "Files that are not counted");
+    assert_eq!(named.matches("<li>").count(), 2, "{named}");
+    assert!(
+        named.contains("not a file of at most 1 GiB") && named.contains("No such file"),
+        "{named}"
+    );
+}
+
 #[test]
 fn reports_of_older_versions_are_read() {
     // From before percentiles had intervals and reports named PC and operator.

@@ -1,6 +1,7 @@
 //! Basis of the figures: counters of the kernel, settings, machine, method.
 
 use crate::bound::MissBound;
+use crate::others::Others;
 use crate::report::{LoopCounts, Report};
 use maud::{Markup, html};
 use stylet_report::parts::{Column, cell, count, num, or_na, table};
@@ -41,19 +42,76 @@ pub fn counters(r: &Report) -> Markup {
                 cell(format!("{} to {}", num(low), num(high)))
             });
             let served = c.interrupts.map(|n| n as f64);
-            vec![cell(c.core), mhz, or_na(c.steal_s), or_na(served)]
+            let busy = |share: Option<f64>| or_na(share.map(|s| 100.0 * s));
+            let counted = c.counted.iter().map(|c| format!("{} {}", c.what, num(c.times as f64)));
+            let smi = c
+                .system_management_interrupts
+                .map(|n| format!("system management interrupts {n}"));
+            let counted: Vec<String> = counted.chain(smi).collect();
+            vec![
+                cell(c.core),
+                mhz,
+                or_na(c.steal_s),
+                or_na(served),
+                busy(c.busy),
+                busy(c.busy_before),
+                cell(counted.join(", ")),
+            ]
         })
         .collect();
     html! {
         h2 { "Counters" }
-        div class="pair" {
-            (table(names, &rows, &COUNTS))
-            (table(&["core", "MHz", "steal time, s", "interrupts served"], &cores, &COUNTS))
-        }
+        (table(names, &rows, &COUNTS))
+        (table(&CORES, &cores, &[Column::Number; 6]))
+        (others(&r.others))
         (miss_bound("Force loop", &r.haptic.miss_bound))
         (miss_bound("Tissue loop", &r.tissue.miss_bound))
         @if let Some(second) = &r.second {
             (miss_bound("Loop of the second device", &second.miss_bound))
+        }
+    }
+}
+
+const CORES: [&str; 7] = [
+    "core",
+    "MHz",
+    "steal time, s",
+    "interrupts served",
+    "busy, %",
+    "since the start, %",
+    "counted during the run",
+];
+
+/// Tabulates what ran beside the measurement.
+fn others(o: &Others) -> Markup {
+    let moments = o.moments.iter().map(|m| {
+        let waited = m
+            .waited_percent
+            .iter()
+            .map(|(what, percent)| format!("{what} {}", num(*percent)));
+        vec![
+            cell(&m.when),
+            or_na(m.load),
+            cell(waited.collect::<Vec<_>>().join(", ")),
+        ]
+    });
+    let threads = o.threads.iter().map(|t| {
+        let priority = t.priority.map_or("normal".to_owned(), |p| format!("real-time {p}"));
+        vec![
+            cell(&t.name),
+            cell(t.id),
+            cell(t.core),
+            cell(priority),
+            or_na(Some(100.0 * t.share)),
+        ]
+    });
+    let (moments, threads): (Vec<_>, Vec<_>) = (moments.collect(), threads.collect());
+    html! {
+        h2 { "What else ran" }
+        p { (o.words()) "." }
+        (table(&["when", "load", "threads that waited for, % of 10 s"], &moments, &[Column::Text, Column::Number]))
+        @if !threads.is_empty() {
+            (table(&["thread", "number", "core", "priority", "% of a core"], &threads, &[Column::Text]))
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Processes: names, and permitted cores of their threads.
+//! Processes and threads: names, permitted cores, priorities, processor time.
 
 use super::{Machine, cores};
 use std::collections::BTreeSet;
@@ -11,7 +11,64 @@ pub struct Process {
     pub name: String,
 }
 
+/// A thread with its processor time so far.
+#[derive(Clone, Debug)]
+pub struct StatOfThread {
+    pub id: u32,
+    pub process: u32,
+    pub parent: u32,
+    pub name: String,
+    /// Core on which it ran last.
+    pub core: usize,
+    /// Real-time priority; `None` for a normal thread.
+    pub priority: Option<u32>,
+    pub ran_ns: u64,
+}
+
+/// Priority of a thread with deadlines, above all others.
+const DEADLINE: u32 = 100;
+
 impl Machine {
+    /// Returns all threads that the kernel shows.
+    pub fn threads(&self) -> Vec<StatOfThread> {
+        let processes = self.names("proc").into_iter().filter_map(|name| name.parse().ok());
+        let of = |process: u32| {
+            let ids = self.names(&format!("proc/{process}/task")).into_iter();
+            ids.filter_map(move |id| self.thread(process, id.parse().ok()?))
+        };
+        processes.flat_map(of).collect()
+    }
+
+    fn thread(&self, process: u32, id: u32) -> Option<StatOfThread> {
+        let stat = self.text(&format!("proc/{process}/task/{id}/stat"))?;
+        // A name may hold spaces and parentheses.
+        let (_, name) = stat.split_once('(')?;
+        let (name, rest) = name.rsplit_once(')')?;
+        let words: Vec<&str> = rest.split_whitespace().collect();
+        // Numbered from 3, the state, in proc(5).
+        let field = |n: usize| words.get(n - 3)?.parse::<u32>().ok();
+        let priority = match field(41)? {
+            1 | 2 => field(40),
+            6 => Some(DEADLINE),
+            _ => None,
+        };
+        Some(StatOfThread {
+            id,
+            process,
+            parent: field(4)?,
+            name: name.to_owned(),
+            core: field(39)? as usize,
+            priority,
+            ran_ns: self.ran_ns(process, id)?,
+        })
+    }
+
+    /// Returns the processor time of a thread so far.
+    pub fn ran_ns(&self, process: u32, id: u32) -> Option<u64> {
+        let text = self.text(&format!("proc/{process}/task/{id}/schedstat"))?;
+        text.split(' ').next()?.parse().ok()
+    }
+
     /// Returns all processes that the kernel shows, in the order of their ids.
     pub fn processes(&self) -> Vec<Process> {
         let ids = self.names("proc").into_iter().filter_map(|name| name.parse().ok());

@@ -103,6 +103,7 @@ pub fn report(parts: &Parts, raw: &Raw) -> Report {
             wake: summary("", &measured.gaps.wake, &[], 1e3),
         },
         cores: measured.cores.clone(),
+        others: measured.others.clone(),
         comparison: parts.comparison.clone(),
         spin_search: parts.spin_search.clone(),
         settings: provenance::settings(parts.machine, options, &measured.run),
@@ -153,12 +154,17 @@ fn latest(measured: &Measured) -> Vec<Late> {
     .collect()
 }
 
-/// Returns the cause shown by the trace; if it does not cover the tick, that seen by the gap watch.
+/// Returns the cause shown by the trace; if it does not cover the tick, a thread that preempts the loop, or what the gap
+/// watch saw.
 fn cause(measured: &Measured, tick: &LateTick) -> String {
     let outliers = measured.trace.iter().flat_map(|t| &t.outliers);
     let traced = outliers.into_iter().find(|o| o.due_ns == tick.due_ns);
     traced.map_or_else(
-        || seen_elsewhere(&measured.gaps, tick.due_ns, tick.due_ns + tick.wake_ns),
+        || {
+            let woke_ns = tick.due_ns + tick.wake_ns;
+            let rival = measured.others.rival(tick.due_ns, woke_ns);
+            rival.unwrap_or_else(|| seen_elsewhere(&measured.gaps, tick.due_ns, woke_ns))
+        },
         |o| o.cause.clone(),
     )
 }

@@ -5,7 +5,7 @@
 //! names the causes between the tick's deadline and its wake-up ([`blame`], [`words`]).
 
 mod blame;
-mod counters;
+pub(crate) mod counters;
 mod event;
 #[cfg(test)]
 mod tests;

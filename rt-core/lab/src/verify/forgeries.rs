@@ -10,6 +10,7 @@ use crate::host::HostReport;
 use crate::load::Load;
 use crate::machine::Machine;
 use crate::measure::Measured;
+use crate::others::Others;
 use crate::raw::Raw;
 use crate::report::{HISTOGRAMS, PAGE, Parts, WAKES, report};
 use crate::sample::{Batched, histogram};
@@ -91,6 +92,7 @@ fn genuine(root: &Path, seed: u64) -> PathBuf {
             late: Vec::new(),
         },
         cores: Vec::new(),
+        others: Others::default(),
         trace: None,
         window_ns: 500_000_000,
         began_s: jiff::Timestamp::now().as_second() as u64 - 3,

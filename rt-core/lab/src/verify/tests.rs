@@ -221,3 +221,57 @@ fn report_of_another_program_is_named() {
         other_program(&Value::Null, Path::new("rt-core"), "4567").is_some_and(|why| why.contains("names no program"))
     );
 }
+
+#[test]
+fn another_challenge_is_refused() {
+    let Some(signed) = Signed::new("nonce") else { return };
+    let asked = |nonce: &str| VerifyArgs {
+        nonce: Some(nonce.to_owned()),
+        ..signed.args()
+    };
+    assert_eq!(run(&asked("7")).expect("readable"), 1, "the report answers none");
+    let text = std::fs::read_to_string(signed.path(JSON)).expect("a report");
+    let bare = text
+        .replacen('{', "{\"nonce\": \"7\", ", 1)
+        .replacen(&text_digest(&text), NO_DIGEST, 1);
+    signed.put(JSON, sealed::seal(&bare).as_bytes());
+    sign::sign(&signed.path(JSON), &signed.path("meyer")).expect("the key signs");
+    assert_eq!(run(&asked("7")).expect("readable"), 0);
+    assert_eq!(run(&asked("8")).expect("readable"), 1);
+}
+
+/// Oracle: openssl itself is the authority.
+#[test]
+fn a_time_stamp_is_checked_and_one_of_another_report_is_refused() {
+    let Some(signed) = Signed::new("stamp") else { return };
+    let openssl = |words: &str| {
+        let run = std::process::Command::new("openssl")
+            .args(words.split(' '))
+            .current_dir(&signed.folder)
+            .output();
+        run.map(|o| assert!(o.status.success(), "{words}: {}", String::from_utf8_lossy(&o.stderr)))
+    };
+    signed.put(
+        "tsa.cnf",
+        b"[req]\ndistinguished_name=dn\n[dn]\n[tsa]\nextendedKeyUsage=critical,timeStamping\n[ts]\ndefault_tsa=t\n[t]\nserial=serial\n\
+          crypto_device=builtin\nsigner_cert=tsa.pem\nsigner_key=tsa.key\nsigner_digest=sha256\ndefault_policy=1.2.3\ndigests=sha256\n",
+    );
+    signed.put("serial", b"01");
+    let made = openssl(
+        "req -x509 -newkey rsa:2048 -nodes -keyout tsa.key -out tsa.pem -subj /CN=Clock -config tsa.cnf -extensions tsa",
+    );
+    if made.is_err() {
+        println!("skipped: openssl is not installed");
+        return;
+    }
+    openssl("ts -query -data report.json -sha256 -cert -out report.json.tsq").expect("runs");
+    openssl("ts -reply -config tsa.cnf -section t -queryfile report.json.tsq -out report.json.tsr").expect("runs");
+    let said = stamp::check(&signed.path(JSON), &signed.path("tsa.pem")).expect("a good stamp");
+    assert!(
+        said.starts_with("stamped by the authority at ") && said.ends_with("GMT"),
+        "{said}"
+    );
+    signed.put(JSON, b"{}");
+    let why = stamp::check(&signed.path(JSON), &signed.path("tsa.pem")).expect_err("another report");
+    assert!(why.to_string().contains("not a time stamp of this report"), "{why}");
+}
