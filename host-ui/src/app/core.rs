@@ -1,11 +1,15 @@
 //! A core that this window starts to replace one that has ended.
 
 use super::App;
+use std::fs::File;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
 const PROGRAM: &str = "rt-core";
+
+/// Its messages. A pipe would end with the window, and the core on its next message.
+const LOG: &str = "out/rt-core.log";
 
 /// Core that ends with the window, unless the window crashes: then it runs on, and the next window finds it.
 #[derive(Debug)]
@@ -29,6 +33,7 @@ impl App {
         let started = Command::new(&program)
             .args(["--instance", &self.shown.instance, "--rt-if-allowed"])
             .stdin(Stdio::null())
+            .stderr(log().map_or_else(|_| Stdio::inherit(), Stdio::from))
             .process_group(0)
             .spawn();
         match started {
@@ -44,9 +49,61 @@ impl App {
     }
 }
 
+impl App {
+    /// Says why the core that this window started has failed.
+    pub(super) fn take_core(&mut self) {
+        let Some(StartedCore(child)) = &mut self.started_core else {
+            return;
+        };
+        let Ok(Some(status)) = child.try_wait() else { return };
+        self.started_core = None;
+        if !status.success() {
+            let last = last_line(&std::fs::read(LOG).unwrap_or_default());
+            self.refuse(format!(
+                "rt-core ended ({status}): {last} All its messages are in {LOG}."
+            ));
+        }
+    }
+}
+
+fn log() -> std::io::Result<File> {
+    std::fs::create_dir_all("out")?;
+    File::create(LOG)
+}
+
+/// Returns the last line with text, safe to show.
+fn last_line(log: &[u8]) -> String {
+    let text = String::from_utf8_lossy(log);
+    let last = text.lines().rev().find(|line| !line.trim().is_empty());
+    stylet_base::format::printable(last.unwrap_or("It gave no reason."))
+}
+
 /// Returns the program next to this one, or the one on the search path.
 fn program() -> PathBuf {
     let own = std::env::current_exe().unwrap_or_default();
     let mut places = own.ancestors().skip(1).take(2).map(|folder| folder.join(PROGRAM));
     places.find(|place| place.is_file()).unwrap_or_else(|| PROGRAM.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::app::tests::fixture::Drawn;
+
+    /// Guards against a core that failed to start without a word.
+    #[test]
+    fn a_core_that_fails_is_reported_with_its_last_words() {
+        assert_eq!(super::last_line(b"one\nrt-core: no memory\n\n"), "rt-core: no memory");
+        let mut drawn = Drawn::new([1280.0, 720.0], 1.0);
+        let failed = std::process::Command::new("false").spawn().expect("a program");
+        drawn.app.started_core = Some(super::StartedCore(failed));
+        while drawn.app.started_core.is_some() {
+            drawn.app.take_core();
+        }
+        let note = drawn.app.shown.note.take().expect("a message");
+        assert!(
+            note.refused && note.text.starts_with("rt-core ended (exit status: 1): "),
+            "{}",
+            note.text
+        );
+    }
 }

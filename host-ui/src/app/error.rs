@@ -26,6 +26,9 @@ pub enum WindowError {
         "no graphics driver can draw the window ({0}). Install mesa-vulkan-drivers, or use `host-ui procedure`, which needs no window"
     )]
     Driver(eframe::egui_wgpu::WgpuError),
+    /// The recording cannot be read.
+    #[error("{0} cannot be opened: {1}. 'host-ui record --out FILE.mcap' makes a recording")]
+    Recording(String, std::io::Error),
     /// Any other error, as the library reports it.
     #[error("the window cannot be opened: {0}. `host-ui procedure` needs no window")]
     Other(eframe::Error),

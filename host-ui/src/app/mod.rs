@@ -157,8 +157,12 @@ pub struct App {
 ///
 /// # Errors
 ///
-/// Without a display or a graphics driver.
+/// Without a display or a graphics driver, or if the recording to watch cannot be opened.
 pub fn run(options: Options) -> Result<(), WindowError> {
+    if let Some(path) = &options.watch {
+        let name = || format::printable(&path.display().to_string());
+        std::fs::File::open(path).map_err(|why| WindowError::Recording(name(), why))?;
+    }
     let mut native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Stylet")

@@ -30,6 +30,7 @@ impl App {
         let plan_before = self.shown.plan.map(|p| p.generation);
         self.shown.take(&self.link);
         self.leave_core();
+        self.take_core();
         self.keep_of_ended_core();
         self.take_stepper();
         if self.shown.plan.map(|p| p.generation) != plan_before {

@@ -236,15 +236,18 @@ fn refused(shown: &Shown) -> Option<Banner> {
 
 fn absent(shown: &Shown, why: &str) -> Banner {
     let text = if why.is_empty() {
-        format!("Start it in another terminal: rt-core --instance {}", shown.instance)
+        format!(
+            "Start it here, or in a terminal: rt-core --instance {}. Step 1 has a recorded example.",
+            shown.instance
+        )
     } else {
         format!("{}{}", what_ended(shown), sentence(why))
     };
     let banner = Banner::new(BannerLevel::Bad, "The simulator core is not running", text);
-    match shown.session.is_some() && shown.relayed.is_none() {
-        _ if shown.reads_recording => banner,
-        true => banner.with("Start it again", Action::StartCore),
-        false => banner.with("Watch example", Action::Watch(WatchAction::Example)),
+    match shown.session {
+        _ if shown.reads_recording || shown.relayed.is_some() => banner,
+        Some(_) => banner.with("Start it again", Action::StartCore),
+        None => banner.with("Start it", Action::StartCore),
     }
 }
 

@@ -27,7 +27,7 @@ fn the_example_opens_with_one_click_without_a_core_and_shows_an_insertion() {
         .wgpu()
         .build_eframe(|cc| App::new(cc, options));
     window.run_steps(5);
-    window.get_by_label("Watch example").click();
+    window.get_by_label("example").click();
     until(&mut window, "the recording", |window| {
         window.query_by_label("RECORDING").is_some()
     });

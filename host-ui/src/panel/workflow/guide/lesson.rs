@@ -48,7 +48,10 @@ fn next_lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
     if !shown.is_live() {
         let why =
             "The window shows what the core computes; it may be closed and opened again without the core noticing.";
-        return of("Start the core: run rt-core in a terminal, or make run.", &[why]);
+        return of(
+            "Start the simulator core: press \"Start it\" above the pictures, or run rt-core in a terminal.",
+            &[why],
+        );
     }
     if shown.running && shown.watched.is_none() {
         return of(
