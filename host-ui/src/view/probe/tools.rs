@@ -88,14 +88,16 @@ impl ProbeView {
         if may_step && by != [0.0; 2] {
             actions.extend(self.step(shown, by));
         }
-        if in_hand.is_some() && may_step {
+        // It keeps its place while the core is silent.
+        ui.add_enabled_ui(in_hand.is_some() && may_step, |ui| {
             let mut is_locked = shown.stepper.is_locked;
             let brake = ui.toggle_value(&mut is_locked, "Brake");
             let hint = "Key B: the stepper holds the probe; only its steps move it";
+            let brake = brake.on_disabled_hover_text("For the probe in the other hand: rt-core --device-2");
             if brake.on_hover_text(hint).clicked() {
                 actions.push(Action::Probe(ProbeAction::ToggleBrake));
             }
-        }
+        });
         actions
     }
 

@@ -365,7 +365,7 @@ impl Overlay<'_> {
     fn isodose_legend(&self, of: &str) {
         let mut at = self.plane.rect.left_bottom() + Vec2::new(10.0, -10.0);
         for level in (0..LEVELS.len()).rev() {
-            let text = format!("{:.0} %", LEVELS[level] * 100.0);
+            let text = format!("{:.0} % {of}", LEVELS[level] * 100.0);
             let rect = self.word(at + Vec2::new(26.0, 0.0), Align2::LEFT_BOTTOM, &text, 11.0, IMAGE.text);
             let y = rect.center().y;
             let ends = [Pos2::new(at.x, y), Pos2::new(at.x + 20.0, y)];
@@ -373,6 +373,5 @@ impl Overlay<'_> {
             self.painter.extend(Shape::dashed_line(&ends, stroke, dash, gap));
             at.y -= 16.0;
         }
-        self.word(at, Align2::LEFT_BOTTOM, of, 11.0, IMAGE.text);
     }
 }
