@@ -48,7 +48,7 @@ fn what_removes_seeds_says_so_and_waits_for_the_answer() {
     for action in actions {
         drawn.app.shown = one_needle(0.0, 5);
         drawn.app.act(action.clone(), &ctx);
-        assert_eq!(drawn.app.run.is_some(), false, "{action:?}");
+        assert!(drawn.app.run.is_none(), "{action:?}");
         assert!(
             !drawn.app.shown.load.is_busy() && drawn.app.waiting.is_empty(),
             "{action:?}"
