@@ -19,6 +19,9 @@ pub enum SignError {
     /// A named file is missing or unreadable.
     #[error(transparent)]
     Disk(#[from] DiskError),
+    /// A signature is required.
+    #[error("missing, the report is not signed")]
+    Unsigned,
     /// `ssh-keygen` does not run.
     #[error("ssh-keygen does not run: {0}")]
     Run(io::Error),
@@ -46,6 +49,16 @@ pub enum SignError {
         /// The file of permitted signers.
         allowed: PathBuf,
     },
+}
+
+/// Problem with the signature of a report.
+#[derive(Debug, thiserror::Error)]
+#[error("{name}: {why}")]
+pub struct SignatureProblem {
+    /// Name of the signature's file.
+    pub name: String,
+    /// Problem with it.
+    pub why: SignError,
 }
 
 /// The signer.
@@ -98,12 +111,15 @@ pub fn sign(file: &Path, key: &Path) -> Result<PathBuf, SignError> {
 pub const UNSIGNED: &str = "not signed";
 
 /// Returns the signer of the report, or the problem with its signature.
-pub fn signer(file: &Path, allowed: Option<&Path>) -> Result<String, String> {
+pub fn signer(file: &Path, allowed: Option<&Path>) -> Result<String, SignatureProblem> {
     let signature = signature_of(file);
     let name = signature.file_name().unwrap_or_default().to_string_lossy().into_owned();
     if !signature.exists() {
         return match allowed {
-            Some(_) => Err(format!("{name}: missing, the report is not signed")),
+            Some(_) => Err(SignatureProblem {
+                name,
+                why: SignError::Unsigned,
+            }),
             None => Ok(UNSIGNED.to_owned()),
         };
     }
@@ -117,7 +133,7 @@ pub fn signer(file: &Path, allowed: Option<&Path>) -> Result<String, String> {
         }),
         // A check that needs the missing program is a problem only if it was requested.
         Err(SignError::Missing) if allowed.is_none() => Ok(format!("{name}: not checked: {}", SignError::Missing)),
-        Err(problem) => Err(format!("{name}: {problem}")),
+        Err(why) => Err(SignatureProblem { name, why }),
     }
 }
 

@@ -129,7 +129,7 @@ pub(crate) fn check(file: &Path, text: &str, allowed: Option<&Path>) -> Checked 
     checked.notes.extend(missing);
     match sign::signer(file, allowed) {
         Ok(note) => checked.notes.push(note),
-        Err(problem) => checked.problems.push(problem),
+        Err(problem) => checked.problems.push(problem.to_string()),
     }
     checked
 }

@@ -227,7 +227,7 @@ pub(crate) fn check(folder: &Path, allowed: Option<&Path>) -> Result<(Vec<String
     let mut notes = Vec::new();
     match sign::signer(&file, allowed) {
         Ok(note) => notes.push(note),
-        Err(problem) => problems.push(problem),
+        Err(problem) => problems.push(problem.to_string()),
     }
     Ok((problems, notes))
 }
