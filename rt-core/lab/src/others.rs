@@ -14,7 +14,7 @@ const NOTABLE: f64 = 0.02;
 const LISTED: usize = 12;
 /// Interval of looks at real-time threads, and of searches for new ones.
 const LOOK: Duration = Duration::from_millis(100);
-const LOOKS_TO_A_SEARCH: u32 = 5;
+const LOOKS_TO_A_SEARCH: u32 = 20;
 /// Most intervals in which a rival ran.
 const KEPT: usize = 4096;
 /// Programs of Stylet that serve an instance.
