@@ -26,7 +26,7 @@ fn the_laboratory_measures_two_seconds_and_verifies_its_report() {
     let said = measured.expect("rt-core starts").stderr;
     let report = folder.join("report/report.json");
     assert!(report.exists(), "{}", String::from_utf8_lossy(&said));
-    assert_eq!(json(&report)["schema"], "stylet.latency/1");
+    assert_eq!(json(&report)["schema"], "stylet.latency/2");
     typed("rt-core", &["verify", "report"], &folder);
 }
 
