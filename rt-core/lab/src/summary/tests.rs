@@ -56,15 +56,21 @@ fn intervals_hold_the_value_of_correlated_series_in_95_of_100() {
         (0.9, 40_000, 0.999, 3.090_232),
     ] {
         let truth_us = f64::exp(z) * 100.0;
-        let held = (0..RUNS).filter(|&seed| {
-            let all = correlated(seed, n, by);
-            interval_us(&all, &all.parts, q).is_some_and(|[low, high]| low <= truth_us && truth_us <= high)
-        });
-        let held = held.count();
-        println!("correlation {by}, {n} values, {q}: {held} of {RUNS}");
-        off.extend((!(930..=970).contains(&held)).then_some((by, q, held)));
+        let given: Vec<[f64; 2]> = (0..RUNS)
+            .filter_map(|seed| {
+                let all = correlated(seed, n, by);
+                interval_us(&all, &all.parts, q)
+            })
+            .collect();
+        let held = given
+            .iter()
+            .filter(|[low, high]| (*low..=*high).contains(&truth_us))
+            .count();
+        let share = held as f64 / given.len() as f64;
+        println!("correlation {by}, {n} values, {q}: {held} of {} given", given.len());
+        off.extend((!(0.93..=0.97).contains(&share) || given.len() < 900).then_some((by, q, held)));
     }
-    assert!(off.is_empty(), "correlation, percentile, held of {RUNS}: {off:?}");
+    assert!(off.is_empty(), "correlation, percentile, held: {off:?}");
 }
 
 #[test]
