@@ -25,7 +25,7 @@ pub struct KeptPlan {
 /// Plan out of use, with its history, compensation and progress.
 pub(super) struct Aside {
     of_scene: Option<(String, [f64; 3])>,
-    body: Option<u64>,
+    body: Option<(u64, u64)>,
     history: History<ImplantPlan>,
     compensated: Vec<(Needle, Compensation)>,
     progress: NeedleProgress,

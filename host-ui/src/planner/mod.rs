@@ -88,8 +88,8 @@ pub struct Planner {
     keeping: Option<Job<()>>,
     /// Plans that were discarded or belong to another scene, at most one for each scene.
     aside: Vec<Aside>,
-    /// Digest of the body for which needles were compensated.
-    body: Option<u64>,
+    /// Digest of the body for which needles were compensated, and the run of the core.
+    body: Option<(u64, u64)>,
     /// Scene for which a kept plan was looked for, and the search.
     looked: Option<(SceneId, Job<KeptPlan>)>,
     /// Needles at their rehearsal, with their compensation.
@@ -162,6 +162,19 @@ impl Planner {
         }
     }
 
+    /// Keeps rehearsals in a body of the same labels, also under another core, whose tissue model is not known here.
+    fn meet_body(&mut self, body: u64, core: u64) {
+        let before = self.body.replace((body, core));
+        if before.map(|(body, _)| body) != Some(body) {
+            self.compensated.clear();
+        } else if before != self.body && !self.compensated.is_empty() {
+            self.message = Some(Note::done(
+                "The rehearsals are those of the core before. Compensate again if this one has other settings."
+                    .to_owned(),
+            ));
+        }
+    }
+
     fn take_scene(&mut self, scene: &Arc<SceneModel>) {
         let key = scene.header.id();
         let of_scene = (scene.header.name.read(), scene.header.upper_m);
@@ -190,10 +203,7 @@ impl Planner {
             match job.poll() {
                 JobUpdate::Pending => {}
                 JobUpdate::Message(Ok(outlines)) => {
-                    // Rehearsals hold in a body of the same labels, also under another core.
-                    if self.body.replace(outlines.body) != Some(outlines.body) {
-                        self.compensated.clear();
-                    }
+                    self.meet_body(outlines.body, outlines.scene.session_id);
                     self.planning.outlines = Some(Arc::new(outlines));
                     self.outlining = None;
                     self.change();

@@ -149,6 +149,19 @@ fn a_plan_returns_with_its_scene_to_new_tissue() {
 }
 
 #[test]
+fn rehearsals_hold_in_the_same_body_with_a_note_under_another_core() {
+    let mut planner = inserting();
+    planner.body = Some((7, 1));
+    planner.meet_body(7, 1);
+    assert!(planner.take_message().is_none());
+    planner.meet_body(7, 2);
+    assert_eq!(planner.compensated.len(), 1);
+    assert!(planner.take_message().is_some_and(|note| !note.refused));
+    planner.meet_body(8, 2);
+    assert!(planner.compensated.is_empty() && planner.take_message().is_none());
+}
+
+#[test]
 fn a_rehearsal_holds_until_its_needle_changes() {
     let mut planner = planner();
     let needle = planned().needles[0].clone();

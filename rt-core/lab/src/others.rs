@@ -14,7 +14,7 @@ const NOTABLE: f64 = 0.02;
 const LISTED: usize = 12;
 /// Interval of looks at real-time threads, and of searches for new ones.
 const LOOK: Duration = Duration::from_millis(100);
-const LOOKS_TO_A_SEARCH: u32 = 20;
+const LOOKS_TO_A_SEARCH: u32 = 5;
 /// Most intervals in which a rival ran.
 const KEPT: usize = 4096;
 /// Programs of Stylet that serve an instance.
@@ -59,10 +59,10 @@ pub struct Others {
 }
 
 impl Others {
-    /// Returns what ran beside the measurement in words; "nothing" only if nothing did.
+    /// Returns what ran beside the measurement in words.
     pub fn words(&self) -> String {
         if self.cores_taken < NOTABLE && self.instances.is_empty() {
-            return "nothing else ran".to_owned();
+            return format!("no other program took {:.0} % of a core", 100.0 * NOTABLE);
         }
         let busy = self.threads.iter().filter(|t| t.share >= NOTABLE).take(4);
         let busy: Vec<String> = busy
@@ -112,6 +112,8 @@ pub fn watch(
         rivals.filter(|t| Some(t.core) == core).cloned().collect()
     };
     let mut rivals = rivals_of(&before);
+    // The last state of each thread, also of those that end during the run.
+    let mut seen: BTreeMap<u32, StatOfThread> = BTreeMap::new();
     let mut ran: BTreeMap<u32, u64> = rivals.iter().map(|t| (t.id, t.ran_ns)).collect();
     let (mut looks, mut last_ns) = (0, begin_ns);
     // A thread that a search finds for the first time may have run since the search before.
@@ -141,6 +143,7 @@ pub fn watch(
             }
         }
         if let Some(found) = found {
+            seen.extend(found.clone());
             (known, searched_ns) = (found, now_ns);
         }
         last_ns = now_ns;
@@ -151,7 +154,8 @@ pub fn watch(
     let passed_ns = (clock::now_ns() - begin_ns).max(1);
     others.moments.push(moment(machine, "after"));
     let after = foreign(machine);
-    let mut threads: Vec<OtherThread> = after
+    seen.extend(after.clone());
+    let mut threads: Vec<OtherThread> = seen
         .values()
         .map(|t| OtherThread {
             share: (t.ran_ns - before.get(&t.id).map_or(0, |b| b.ran_ns).min(t.ran_ns)) as f64 / passed_ns as f64,
@@ -231,9 +235,9 @@ mod tests {
     }
 
     #[test]
-    fn nothing_else_is_said_only_where_nothing_ran() {
+    fn no_other_program_is_said_only_where_none_ran() {
         let mut others = Others::default();
-        assert_eq!(others.words(), "nothing else ran");
+        assert_eq!(others.words(), "no other program took 2 % of a core");
         others.threads.push(OtherThread {
             name: "yes".to_owned(),
             id: 7,

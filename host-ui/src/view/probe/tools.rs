@@ -93,7 +93,7 @@ impl ProbeView {
             let mut is_locked = shown.stepper.is_locked;
             let brake = ui.toggle_value(&mut is_locked, "Brake");
             let hint = "Key B: the stepper holds the probe; only its steps move it";
-            let brake = brake.on_disabled_hover_text("For the probe in the other hand: rt-core --device-2");
+            let brake = brake.on_disabled_hover_text("Only the simulated hand of rt-core --device-2 has a brake");
             if brake.on_hover_text(hint).clicked() {
                 actions.push(Action::Probe(ProbeAction::ToggleBrake));
             }
