@@ -4,8 +4,10 @@ use super::class::{inject_exercises, line_to_a_core, trainees, whole_class};
 use super::fixture::{Drawn, LONG_PATH, dose, live, many_needles, one_needle, proposals};
 use super::text::misplaced;
 use super::update::{deciding, drawing, searching};
+use crate::action::Action;
 use crate::app::App;
 use crate::app::layout::Narrow;
+use crate::panel::question::Question;
 use crate::panel::workflow::Progress;
 use crate::settings::Layout;
 use crate::shown::{LoadState, Note, Shown, Watched};
@@ -13,7 +15,7 @@ use crate::view::state::Tool;
 use bytemuck::Zeroable;
 use stylet_host::link::{LinkStatus, TimeMark};
 use stylet_procedure::{Step, Waiting, WaitsFor};
-use stylet_shm_schema::{EventKind, Fault, SecondState, Text, TickRecord, flags};
+use stylet_shm_schema::{EventKind, Fault, Request, SecondState, Text, TickRecord, flags};
 use stylet_shm_schema::{LeftNeedlePose, MAX_LEFT_NEEDLES};
 
 pub type State = (&'static str, fn(&mut App));
@@ -136,6 +138,10 @@ pub const STATES: &[State] = &[
         guided(app, one_needle(0.0, 5));
         app.shown.dose = Some(dose(5));
     }),
+    ("question before a reset", |app| {
+        app.shown = one_needle(0.0, 5);
+        app.question = Some(Question::Remove("Reset", Action::Send(Request::Reset)));
+    }),
     ("planned", |app| app.shown = one_needle(0.0, 0)),
     ("inserting", |app| app.shown = one_needle(0.03, 0)),
     ("dropping", |app| {
@@ -218,9 +224,13 @@ fn recorded(app: &mut App, shown: Shown, has_ended: bool) {
         is_held: !has_ended,
         has_ended,
         speed: 0.25,
-        marks: [EventKind::Puncture, EventKind::SeedDropped, EventKind::FaultRaised]
-            .map(|kind| TimeMark { at_s: 100.0, kind })
-            .into(),
+        marks: [
+            (100.0, EventKind::Puncture),
+            (600.0, EventKind::SeedDropped),
+            (900.0, EventKind::FaultRaised),
+        ]
+        .map(|(at_s, kind)| TimeMark { at_s, kind })
+        .into(),
     });
 }
 
