@@ -92,10 +92,12 @@ pub fn run(args: &FleetArgs) -> Result<u8, FleetError> {
     let (table_file, page_file) = (args.out.join(TABLE), args.out.join(PAGE));
     write_whole(&table_file, table.as_bytes()).map_err(DiskError::from)?;
     write_whole(&page_file, page.as_bytes()).map_err(DiskError::from)?;
+    let words = |pc: &Pc| pc.latest().outcome().words();
+    let width = pcs.iter().map(|pc| words(pc).len()).max().unwrap_or(0);
     for pc in &pcs {
         println!(
-            "{:<14} {} ({}, latest of {}; {})",
-            pc.latest().outcome().words(),
+            "{:<width$} {} ({}, latest of {}; {})",
+            words(pc),
             printable_line(&pc.name),
             page::counted(pc.entries.len(), "report", "reports"),
             printable_line(&pc.latest().report.made_at),

@@ -129,12 +129,14 @@ fn setup_of<'a>(args: &'a LatencyArgs, options: &'a Options) -> Setup<'a> {
 
 /// Prints the verdict on the terminal: one line for each limit, then the overall one.
 fn print_verdict(report: &Report) {
-    for j in &report.verdict.limits {
+    let limits = &report.verdict.limits;
+    let width = limits.iter().map(|j| j.outcome.words().len()).max().unwrap_or(0);
+    for j in limits {
         let value = j.value.map_or("n/a".to_owned(), |v| format!("{v:.1}"));
         let sign = if j.lower_bound { ">=" } else { "<=" };
         let why = if j.outcome == Outcome::Pass { "" } else { &j.evidence };
         println!(
-            "{:<14} {:<24} {value:>9} {sign} {:<8} {:<4} {why}",
+            "{:<width$} {:<24} {value:>9} {sign} {:<8} {:<4} {why}",
             j.outcome.words(),
             j.name,
             j.limit,
