@@ -1,5 +1,6 @@
 //! Executes the operator's requests, after all panels are drawn.
 
+use super::debrief::folder_of;
 use super::drive::{BEFORE_ENTRY_M, Drive, Goal};
 use super::{App, Waiting};
 use crate::action::Action;
@@ -81,8 +82,11 @@ impl App {
         match self.question.take().filter(|_| is_agreed) {
             Some(Question::Rearm(begin)) => self.rearm(begin),
             Some(Question::Remove(_, action)) => {
-                self.save_implant("before-reset");
+                let folder = folder_of("before-reset");
+                self.save_seeds(folder.clone());
                 self.execute(action, ctx);
+                // Not before: no run begins while the planner writes.
+                self.save_plan(&folder);
             }
             None => {}
         }

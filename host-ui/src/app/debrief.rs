@@ -3,7 +3,7 @@
 use super::App;
 use crate::planner;
 use crate::shown::{Note, SeedError, all_errors};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use stylet_base::format;
 use stylet_base::job::{Job, JobUpdate};
@@ -22,6 +22,11 @@ use stylet_shm_schema::{Prescribed, SeedPose, TickRecord};
 pub(super) type Saved = Result<PathBuf, Failure>;
 /// Any error, shown as text.
 pub(super) type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+/// Returns a new folder for an implant that is about to be lost, named after the cause and the time.
+pub(super) fn folder_of(why: &str) -> PathBuf {
+    PathBuf::from(format!("out/{why}-{}", format::utc_now()))
+}
 
 /// Data of a debrief, as of the request for it.
 pub(super) struct Delivered {
@@ -65,10 +70,18 @@ impl App {
 
     /// Writes plan and debrief, as far as there are any, to a new folder under out/.
     pub(super) fn save_implant(&mut self, why: &str) {
-        let folder = PathBuf::from(format!("out/{why}-{}", format::utc_now()));
-        if self.shown.planning.implant.is_some() && std::fs::create_dir_all(&folder).is_ok() {
+        let folder = folder_of(why);
+        self.save_plan(&folder);
+        self.save_seeds(folder);
+    }
+
+    pub(super) fn save_plan(&mut self, folder: &Path) {
+        if self.shown.planning.implant.is_some() && std::fs::create_dir_all(folder).is_ok() {
             self.planner.export(folder.join("plan.toml"), self.scene_file());
         }
+    }
+
+    pub(super) fn save_seeds(&mut self, folder: PathBuf) {
         if !self.shown.seeds.is_empty() {
             self.save_debrief_as(folder);
         }

@@ -235,6 +235,7 @@ fn needles_go_in_one_after_the_other_by_one_key() {
     driven.picture("plan-debrief");
     // The scripted hand does the same, from the beginning.
     driven.click("Run all 2 needles");
+    driven.press(Key::Y);
     driven.until("the first needle", |app| app.planner().progress().begun() == 1);
     wait_long(&mut driven, "the scripted hand", done);
     wait_long_for_label(&mut driven, "All 2 needles are done.");
