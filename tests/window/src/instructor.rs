@@ -278,6 +278,8 @@ fn members_are_listed_and_the_needle_can_be_handed_over() {
         }
     };
     shown(&mut driven, "Members");
+    // Its banner pushes the button of the other one down, and may come later.
+    shown(&mut driven, "Hand over");
     driven.click("Members");
     shown(&mut driven, "Hand the needle to Olga");
     publish();
