@@ -95,7 +95,26 @@ impl Driven {
         self.until("the needle at its entry", |app| {
             app.link().state().is_some_and(|s| s.flags & flags::AT_GOAL != 0)
         });
-        self.window.run_steps(2);
+        self.rest();
+    }
+
+    /// Waits until the tip stands: the goal is reached to 0.1 mm while the hand still moves, and an exercise that loses the
+    /// device would hold it there.
+    fn rest(&mut self) {
+        let tip =
+            |driven: &Self| nalgebra::Vector3::from(driven.window.state().link().state().expect("live").tip_in_scene_m);
+        let begun = Instant::now();
+        loop {
+            let before = tip(self);
+            for _ in 0..10 {
+                self.window.run_steps(1);
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            if (tip(self) - before).norm() < 1e-6 {
+                return;
+            }
+            assert!(begun.elapsed() < Duration::from_secs(30), "the tip never stood");
+        }
     }
 
     /// Pulls the tip in the sagittal slice by hand.

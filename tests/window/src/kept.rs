@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 /// Patience, because moving parts are drawn coarser, and a busy machine reaches the picture at rest
 /// late.
-const PATIENCE: Duration = Duration::from_secs(6);
+const PATIENCE: Duration = Duration::from_secs(20);
 /// Tile size in pixels.
 const TILE: u32 = 40;
 
