@@ -114,10 +114,11 @@ fn force(set: &ParameterSet, device: &DeviceInfo) -> ForceParameters {
 /// Returns the layers in the order of `LayerKind`.
 fn layers(set: &ParameterSet) -> Layers {
     use ParameterId as P;
-    let layer = |depth: Option<P>, peak: Option<P>, cutting, friction| Layer {
+    let layer = |depth: Option<P>, peak: Option<P>, cutting, toughness, friction| Layer {
         puncture_depth_m: depth.map_or(0.0, |id| set.get(id)),
         puncture_force_n: peak.map_or(0.0, |id| set.get(id)),
         cutting_force_n: set.get(cutting),
+        toughness_j_per_m2: set.get(toughness),
         shaft_friction_n_per_m: set.get(friction),
     };
     Layers([
@@ -125,19 +126,28 @@ fn layers(set: &ParameterSet) -> Layers {
             Some(P::PunctureDepth),
             Some(P::MembranePeak),
             P::CuttingForce,
+            P::GlandToughness,
             P::ShaftFriction,
         ),
         layer(
             Some(P::SkinPunctureDepth),
             Some(P::SkinPeak),
             P::SkinCutting,
+            P::SkinToughness,
             P::SkinFriction,
         ),
-        layer(None, None, P::SurroundingsCutting, P::SurroundingsFriction),
+        layer(
+            None,
+            None,
+            P::SurroundingsCutting,
+            P::SurroundingsToughness,
+            P::SurroundingsFriction,
+        ),
         layer(
             Some(P::WallPunctureDepth),
             Some(P::WallPeak),
             P::WallCutting,
+            P::WallToughness,
             P::WallFriction,
         ),
     ])
@@ -170,6 +180,7 @@ mod tests {
             close(ours.puncture_depth_m, default.puncture_depth_m);
             close(ours.puncture_force_n, default.puncture_force_n);
             close(ours.cutting_force_n, default.cutting_force_n);
+            close(ours.toughness_j_per_m2, default.toughness_j_per_m2);
             close(ours.shaft_friction_n_per_m, default.shaft_friction_n_per_m);
         }
         close(active.force.gate.force_scale, f.gate.force_scale);

@@ -44,7 +44,7 @@ parameters! {
     RetractionRatio "needle.retraction_ratio" "Retraction ratio K_ret" Needle "" 1.0, 0.0, 1.0, 0.3, "paper eq. 6", "Share of the tip's step that the tissue follows on the way out. Has no part on a needle line.";
     PunctureHysteresis "needle.puncture_hysteresis" "Puncture hysteresis" Needle "mm" 1e3, 0.0, 5.0, 0.5, "ours, physics.md", "How far the tip must come back out before the membrane counts as closed (docs/physics.md, Needle and tissue).";
     MembranePeak "force.membrane_peak" "Membrane force F_R" Force "N" 1.0, 0.0, 20.0, 5.6, "Podder 2006", "Force of the capsule at the moment of puncture (paper eq. 10).";
-    CuttingForce "force.cutting" "Cutting force" Force "N" 1.0, 0.0, 10.0, 1.5, "ours", "Force at the tip while it cuts the gland.";
+    CuttingForce "force.cutting" "Cutting force" Force "N" 1.0, 0.0, 10.0, 1.5, "ours", "Force at the tip while it cuts the gland, by eq. 9. Has no part on a needle line, where toughness takes its place.";
     GuideStiffness "force.guide_stiffness" "Guide stiffness K" Force "N/m" 1.0, 0.0, 800.0, 400.0, "paper eq. 9", "Spring towards the straight path.";
     GuideGain "force.guide_gain" "Guide gain K_C" Force "" 1.0, 0.0, 1.0, 1.0, "paper eq. 9", "Scales the guide; 0 turns it off.";
     Damping "force.damping" "Damping K_V" Force "N s/m" 1.0, 0.0, 20.0, 5.0, "paper eq. 9", "Force against the tip's speed. Not the K_V of the needle.";
@@ -63,20 +63,20 @@ parameters! {
     StickDamping "force.stick_damping" "Stick damping" Force "N s/m" 1.0, 0.0, 20.0, 10.0, "ours", "Damping of a needle that sticks; keeps the stick stiffness stable.";
     SkinPunctureDepth "layers.perineum_puncture_depth" "Perineum: puncture depth" Layers "mm" 1e3, 0.5, 30.0, 12.0, "ours", "Depth at which the needle goes through the skin.";
     SkinPeak "layers.perineum_peak" "Perineum: puncture force" Layers "N" 1.0, 0.0, 20.0, 9.0, "Podder 2006", "Force of the skin at the moment of puncture.";
-    SkinCutting "layers.perineum_cutting" "Perineum: cutting force" Layers "N" 1.0, 0.0, 10.0, 1.0, "ours", "Force at the tip while it cuts the perineum.";
+    SkinCutting "layers.perineum_cutting" "Perineum: cutting force" Layers "N" 1.0, 0.0, 10.0, 1.0, "ours", "Force at the tip while it cuts the perineum, by eq. 9. Has no part on a needle line.";
     SkinFriction "layers.perineum_friction" "Perineum: shaft friction" Layers "N/m" 1.0, 0.0, 500.0, 40.0, "ours", "Friction along the shaft for each metre in the perineum.";
-    SurroundingsCutting "layers.surroundings_cutting" "Fat: cutting force" Layers "N" 1.0, 0.0, 10.0, 0.3, "ours", "Force at the tip while it cuts fat and what else has no membrane.";
+    SurroundingsCutting "layers.surroundings_cutting" "Fat: cutting force" Layers "N" 1.0, 0.0, 10.0, 0.3, "ours", "Force at the tip while it cuts fat and what else has no membrane, by eq. 9. Has no part on a needle line.";
     SurroundingsFriction "layers.surroundings_friction" "Fat: shaft friction" Layers "N/m" 1.0, 0.0, 500.0, 15.0, "ours", "Friction along the shaft for each metre in fat.";
     WallPunctureDepth "layers.wall_puncture_depth" "Organ wall: puncture depth" Layers "mm" 1e3, 0.5, 20.0, 4.0, "ours", "Depth at which the needle goes through the wall of urethra, bladder or rectum.";
     WallPeak "layers.wall_peak" "Organ wall: puncture force" Layers "N" 1.0, 0.0, 20.0, 2.0, "ours", "Force of the wall at the moment of puncture.";
-    WallCutting "layers.wall_cutting" "Organ wall: cutting force" Layers "N" 1.0, 0.0, 10.0, 0.8, "ours", "Force at the tip while it cuts the wall.";
+    WallCutting "layers.wall_cutting" "Organ wall: cutting force" Layers "N" 1.0, 0.0, 10.0, 0.8, "ours", "Force at the tip while it cuts the wall, by eq. 9. Has no part on a needle line.";
     WallFriction "layers.wall_friction" "Organ wall: shaft friction" Layers "N/m" 1.0, 0.0, 500.0, 40.0, "ours", "Friction along the shaft for each metre in the wall.";
     QuickCreep "tissue.quick_creep" "Quick creep" Tissue "" 1.0, 0.0, 5.0, 0.0, "physics.md, Creep", "Displacement that tissue adds under a load that is held, over that at once, within some times the quick time. 0 is off; a prostate has about 0.6. Acts on a needle line.";
     QuickCreepTime "tissue.quick_creep_time" "Quick creep: time" Tissue "s" 1.0, 0.01, 10.0, 0.5, "physics.md, Creep", "Time in which 63 % of the quick creep has come.";
     SlowCreep "tissue.slow_creep" "Slow creep" Tissue "" 1.0, 0.0, 5.0, 0.0, "physics.md, Creep", "The same over a longer time. 0 is off; a prostate has about 1. Acts on a needle line.";
     SlowCreepTime "tissue.slow_creep_time" "Slow creep: time" Tissue "s" 1.0, 0.1, 100.0, 5.0, "physics.md, Creep", "Time in which 63 % of the slow creep has come.";
     BendingStiffness "needle.bending_stiffness" "Bending stiffness E I" Needle "N m2" 1.0, 0.0, 1.0, 0.0, "physics.md, Beam", "How stiff the needle is against bending. 0 is a needle that does not bend, 0.016 one of 18 G steel. Acts on a needle line that was prepared for it.";
-    Bevel "needle.bevel" "Bevel" Needle "" 1.0, 0.0, 1.0, 0.1, "physics.md, Beam", "Force of the bevel across a needle that bends, over the cutting force. It leads towards the x axis of the tool, so turning the needle turns it.";
+    Bevel "needle.bevel" "Bevel" Needle "" 1.0, 0.0, 5.0, 0.7, "physics.md, Beam", "Force of the bevel across a needle that bends, over the cutting force. It leads towards the x axis of the tool, so turning the needle turns it.";
     TemplateGap "needle.template_gap" "Template: play of the hole" Needle "mm" 1e3, 0.0, 3.0, 0.1, "ours", "Room on each side of a needle that bends, in the hole of the template.";
     TemplateDistance "needle.template_distance" "Template: distance" Needle "mm" 1e3, 0.0, 150.0, 20.0, "ours", "From the template to the place of entry of a needle that bends; 0 is a needle without a template.";
     EntryScatter "needle.entry_scatter" "Scatter of the entry" Needle "mm" 1e3, 0.0, 10.0, 0.0, "physics.md, Scatter", "Rehearsals and studies: standard deviation of how far a needle enters beside its hole, in each direction across. 0 is off.";
@@ -84,4 +84,8 @@ parameters! {
     ScatterSeed "needle.scatter_seed" "Scatter: seed" Needle "" 1.0, 1.0, 1e6, 1.0, "ours", "Which of the random numbers scatter and deflection are. The same seed gives the same needle the same error.";
     MigratingShare "seeds.migrating_share" "Seeds that migrate" Seeds "%" 100.0, 0.0, 100.0, 0.0, "off; 1748-717X-6-130", "Share of the loose seeds that go back along the open track of their needle once it is out; 0 turns it off. In patients 0.47 % of 19,236 migrated.";
     MigrationSpeed "seeds.migration_speed" "Speed of migration" Seeds "mm/s" 1e3, 0.0, 50.0, 0.5, "ours, assumed", "How fast a seed that migrates moves along its track towards the entry.";
+    GlandToughness "layers.gland_toughness" "Gland: fracture toughness" Layers "J/m2" 1.0, 0.0, 5000.0, 164.0, "Gokgol 2012 (bovine liver); assumed for the prostate", "Work of the tip for each area that it separates, on a needle line: times the needle's diameter this is the cutting force, 0.21 N with 164 (liver, by needles: 76 to 185 in Azar 2008, 164 in Gokgol 2012).";
+    SkinToughness "layers.perineum_toughness" "Perineum: fracture toughness" Layers "J/m2" 1.0, 0.0, 5000.0, 200.0, "assumed", "Work of the tip for each area of perineum that it separates, on a needle line.";
+    SurroundingsToughness "layers.surroundings_toughness" "Fat: fracture toughness" Layers "J/m2" 1.0, 0.0, 5000.0, 50.0, "assumed", "Work of the tip for each area of fat that it separates, on a needle line.";
+    WallToughness "layers.wall_toughness" "Organ wall: fracture toughness" Layers "J/m2" 1.0, 0.0, 5000.0, 200.0, "assumed", "Work of the tip for each area of wall that it separates, on a needle line.";
 }

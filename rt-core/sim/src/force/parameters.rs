@@ -114,7 +114,7 @@ impl ForceParameters {
             0.0,
             10.0,
         );
-        problems.range("force.bending.bevel", bending.bevel, 0.0, 2.0);
+        problems.range("force.bending.bevel", bending.bevel, 0.0, 5.0);
         problems.range("force.bending.template_gap_m", bending.template_gap_m, 0.0, 0.01);
         problems.range(
             "force.bending.template_distance_m",

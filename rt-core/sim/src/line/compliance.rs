@@ -25,6 +25,10 @@ pub struct Compliance {
     pub needle_m_per_n: f64,
     /// m/N, 2m x 2m; with the needle's own.
     pub(super) rows: Rows,
+    /// Compliance of the tip at each station that its rows lack in a tip of the needle's radius, m/N.
+    pub tip_missing_m_per_n: Vec<f64>,
+    /// Force on the tip at each station that opens the cut to the needle's width, N.
+    pub wedge_n: Vec<f64>,
     /// Distance of stations across, m.
     pub across_spacing_m: f64,
     /// Compliance of the stations across, along the two directions, m/N; empty where they were not solved for.
@@ -72,6 +76,8 @@ impl Compliance {
             needle_m_per_n: 0.0,
             across_spacing_m: stations.group() as f64 * stations.settings.spacing_m,
             rows,
+            tip_missing_m_per_n: stations.tip_missing_m_per_n.clone(),
+            wedge_n: stations.wedge_n.clone(),
             across: sides,
             foundation: axial.iter().map(foundation).collect(),
         })
@@ -104,6 +110,8 @@ impl Compliance {
             needle_m_per_n: 0.0,
             across_spacing_m: spacing_m,
             rows: Rows::new(2 * stations, entry),
+            tip_missing_m_per_n: vec![0.0; stations],
+            wedge_n: vec![0.0; stations],
             across: [Rows::default(), Rows::default()],
             foundation: vec![-1.0; 2 * stations],
         }
@@ -136,6 +144,19 @@ impl Compliance {
     /// Returns the compliance that all stations share, m/N: of the body as a whole and of the needle itself.
     pub(super) fn common_m_per_n(&self) -> f64 {
         self.whole_m_per_n + self.needle_m_per_n
+    }
+
+    /// Returns whether the numbers of the tip are those of as many stations.
+    pub(super) fn has_whole_tip(&self) -> bool {
+        [&self.tip_missing_m_per_n, &self.wedge_n]
+            .iter()
+            .all(|each| each.len() == self.stations && each.iter().all(|v| v.is_finite() && *v >= 0.0))
+    }
+
+    /// Returns the compliance that the tip's rows lack where its load has these weights, m/N.
+    pub(super) fn tip_missing_m_per_n(&self, range: std::ops::Range<usize>, weights: &[f64]) -> f64 {
+        let places = self.tip_missing_m_per_n.iter().skip(range.start).zip(weights);
+        places.take(range.len()).map(|(missing, weight)| missing * weight).sum()
     }
 
     /// Returns the displacement of row `i` by a newton at row `j`, m/N.

@@ -148,6 +148,9 @@ pub(super) fn advance(
         }
         let goes_on = gap_m > CLOSED_M && is_pushed && front.membrane.is_none();
         let goes_back = gap_m < -CLOSED_M && state.tip.force_n <= 0.0;
+        if goes_back && front.membrane.is_some() && state.tip.draw_back(-gap_m) {
+            continue;
+        }
         if goes_back && !has_met(model, state, tip_m) {
             break;
         }
@@ -258,7 +261,7 @@ pub(super) fn lay(model: &LineModel, state: &mut LineState) -> usize {
     let m = c.stations;
     let column = &mut state.tip_column[..now];
     column.fill(0.0);
-    state.tip_own = 0.0;
+    state.tip_own = c.tip_missing_m_per_n(state.tip_range.clone(), &state.tip_weights);
     for (n, &weight) in state.tip_range.clone().zip(&state.tip_weights) {
         let row = c.rows.row(m + n);
         add_scaled(weight, &row[..now], column);

@@ -48,4 +48,4 @@ pub use prony::PronyTerm;
 pub use ready::{BodyAnswer, BodyLine, HandLine, LayerForces, LineError, LineSource, NeedleBending, ReadyLine, Track};
 pub use rows::Rows;
 pub use state::{LineOutput, LineState, TipState};
-pub use stations::{Line, StationSettings, Stations};
+pub use stations::{Line, NEEDLE_RADIUS_M, StationSettings, Stations};

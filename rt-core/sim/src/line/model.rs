@@ -22,7 +22,7 @@ pub struct LineLayer {
     /// Largest distance that the membrane may be pushed from rest; it gives way at whichever comes first. Infinite to
     /// go by force alone.
     pub puncture_depth_m: f64,
-    /// Force at the tip while it cuts, N.
+    /// Force at the tip that separates tissue, N; none in a track. The wedge of [`Compliance::wedge_n`] comes on top.
     pub cutting_force_n: f64,
     /// Friction for each metre of shaft.
     pub shaft_friction_n_per_m: f64,
@@ -44,8 +44,6 @@ impl Default for LineLayer {
 /// Settings of the needle line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineSettings {
-    /// Part of the cutting force that is left in a track that was cut before (assumed).
-    pub track_cutting_ratio: f64,
     /// Rate term: force for each metre of shaft and metre per second of slip; 0 is off.
     pub viscous_n_s_per_m2: f64,
     /// Relaxation; terms of no strength are off.
@@ -62,7 +60,6 @@ pub struct LineSettings {
 impl Default for LineSettings {
     fn default() -> Self {
         LineSettings {
-            track_cutting_ratio: 0.2,
             viscous_n_s_per_m2: 0.0,
             prony: [PronyTerm::default(); 2],
             by_sets: true,
@@ -112,13 +109,13 @@ impl LineModel {
             problems.range("layer.shaft_friction_n_per_m", layer.shaft_friction_n_per_m, 0.0, 1e4);
             problems.range("layer.puncture_depth_m", layer.puncture_depth_m, 1e-6, f64::INFINITY);
         }
-        problems.range("line.track_cutting_ratio", settings.track_cutting_ratio, 0.0, 1.0);
         problems.range("line.viscous_n_s_per_m2", settings.viscous_n_s_per_m2, 0.0, 1e6);
         for term in settings.prony {
             problems.range("prony.strength", term.strength, 0.0, 10.0);
             problems.range("prony.time_s", term.time_s, 1e-3, 1e5);
         }
-        let is_definite = (0..2 * c.stations).all(|n| c.at(n, n) > 0.0 && c.rows.row(n).iter().all(|v| v.is_finite()));
+        let is_definite = c.has_whole_tip()
+            && (0..2 * c.stations).all(|n| c.at(n, n) > 0.0 && c.rows.row(n).iter().all(|v| v.is_finite()));
         problems.range(
             "line.compliance is positive",
             f64::from(u8::from(is_definite)),

@@ -255,10 +255,22 @@ impl HandLine {
         self.state.elastic_j(&self.model)
     }
 
-    /// Returns the displacement of the material at the tip along the line, m.
+    /// Returns the displacement of the tissue around the tip along the line, m: less what the needle itself gives, and
+    /// less what only tissue nearer than the tip's patch on the lattice moves.
     pub fn tip_displacement_m(&self) -> f64 {
         let load_n: f64 = self.state.loads_n().iter().sum::<f64>() + self.state.whole_n();
-        self.state.tip_displacement_m() - self.model.compliance().needle_m_per_n * load_n
+        let near_m = if self.state.membrane_n_per_m == 0.0 {
+            self.state.memory.gain * self.tip_missing_m_per_n() * self.state.tip.force_n
+        } else {
+            self.state.tip.ahead_m
+        };
+        self.state.tip_displacement_m() - near_m - self.model.compliance().needle_m_per_n * load_n
+    }
+
+    /// Returns the compliance that the tip's rows lack at its present place, m/N.
+    pub(super) fn tip_missing_m_per_n(&self) -> f64 {
+        let (range, weights) = (self.state.tip_range.clone(), &self.state.tip_weights);
+        self.model.compliance.tip_missing_m_per_n(range, weights)
     }
 
     /// Returns the displacement of the body as a whole by the force that a membrane passes on to it, along the line, m.

@@ -26,8 +26,11 @@ pub struct TipState {
     pub held_by: u32,
     /// Displacement of the tissue there when the tip met that membrane.
     pub met_u_m: f64,
-    /// The same, less what the body as a whole was.
+    /// The same, less what the body as a whole was, and without the next.
     pub met_dent_m: f64,
+    /// Dent of the tip that is narrower than its patch, from when it met that membrane: the tip is so far ahead of the
+    /// membrane's tissue until it draws back through it.
+    pub ahead_m: f64,
 }
 
 /// Forces of one tick, N.
@@ -168,8 +171,12 @@ impl LineState {
             .enumerate()
             .map(|(n, force)| 0.5 * force * dot(rows.row(n), &f))
             .sum();
+        let missing = model
+            .compliance
+            .tip_missing_m_per_n(self.tip_range.clone(), &self.tip_weights);
+        let near_tip_j = 0.5 * missing * self.tip.force_n * self.tip.force_n;
         let common_m_per_n = model.compliance.common_m_per_n();
-        at_once + self.memory.stored_j(rows, common_m_per_n, &model.settings.prony)
+        at_once + near_tip_j + self.memory.stored_j(rows, common_m_per_n, &model.settings.prony)
     }
 
     /// Returns the part of the tip's force that moves the body as a whole and is not among the loads, N.

@@ -16,6 +16,9 @@ const ACROSS: usize = 8;
 /// / r over all pairs of points of a unit cube.
 const CUBE_PER_RADIUS: f64 = 1.882_312_645;
 
+/// Outer radius of an 18 G needle, m (nominal outer diameter 1.27 mm).
+pub const NEEDLE_RADIUS_M: f64 = 0.635e-3;
+
 /// A straight way in the scene frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
@@ -55,17 +58,17 @@ pub struct StationSettings {
     pub spacing_m: f64,
     /// Radius of the needle, m.
     pub needle_radius_m: f64,
-    /// Radius of the rigid sphere that moves tissue as far as the tip does with the same force.
+    /// Radius of the rigid sphere that the tip's patch on the lattice stands for: the widest load that is still local.
+    /// What moves nearer to the tip than that is added in closed form, so a result does not depend on it.
     pub tip_radius_m: f64,
 }
 
 impl StationSettings {
-    /// Returns the settings of an 18 G needle, a station for each element on the way. The tip's radius is that of what
-    /// it presses before it cuts (assumed): with its own 0.6 mm, 1.5 N would move soft tissue by 22 mm.
+    /// Returns the settings of an 18 G needle, a station for each element on the way.
     pub fn of_lattice(spacing_m: f64) -> Self {
         StationSettings {
             spacing_m,
-            needle_radius_m: 0.635e-3,
+            needle_radius_m: NEEDLE_RADIUS_M,
             tip_radius_m: 2.5e-3,
         }
     }
@@ -84,6 +87,10 @@ pub struct Stations {
     pub tip: Vec<Vec<(u32, f64)>>,
     /// Compliance of each station that the lattice lacks, m/N: see `compliance`.
     pub missing_m_per_n: Vec<f64>,
+    /// Compliance of the tip at each station that its patch lacks in a tip of the needle's radius, m/N.
+    pub tip_missing_m_per_n: Vec<f64>,
+    /// Force on the tip at each station that opens the cut to the needle's width, N.
+    pub wedge_n: Vec<f64>,
 }
 
 impl Stations {
@@ -95,10 +102,14 @@ impl Stations {
             shaft: Vec::new(),
             tip: Vec::new(),
             missing_m_per_n: Vec::new(),
+            tip_missing_m_per_n: Vec::new(),
+            wedge_n: Vec::new(),
         };
+        let radius_m = settings.needle_radius_m;
+        let beyond_patch = (1.0 / radius_m - 1.0 / stations.patch_radius_m(model.spacing_m())).max(0.0);
         for n in 0..most {
             let middle_m = (n as f64 + 0.5) * settings.spacing_m;
-            let Some([shear_pa, _]) = model.material(line.point_m(middle_m, [0.0; 2])) else {
+            let Some([shear_pa, nu]) = model.material(line.point_m(middle_m, [0.0; 2])) else {
                 break;
             };
             let (shaft, tip) = (
@@ -108,9 +119,15 @@ impl Stations {
             if shaft.is_empty() || tip.is_empty() {
                 break;
             }
-            let ratio = super::compliance::lattice_radius_m(model, &stations, middle_m) / settings.needle_radius_m;
+            let ratio = super::compliance::lattice_radius_m(model, &stations, middle_m) / radius_m;
             let per_length = ratio.ln().max(0.0) / (std::f64::consts::TAU * shear_pa);
             stations.missing_m_per_n.push(per_length / settings.spacing_m);
+            stations
+                .tip_missing_m_per_n
+                .push(sphere_m2_per_n(shear_pa, nu) * beyond_patch);
+            stations
+                .wedge_n
+                .push(std::f64::consts::PI * shear_pa * radius_m * radius_m);
             stations.shaft.push(shaft);
             stations.tip.push(tip);
         }
@@ -158,6 +175,13 @@ impl Stations {
         (cube_m.powi(2) - SPREAD * lattice_spacing_m.powi(2)).max(0.0).sqrt()
     }
 
+    /// Returns the radius of the sphere that this box moves tissue as: of the tip's, or of the smallest that the lattice
+    /// can load.
+    fn patch_radius_m(&self, lattice_spacing_m: f64) -> f64 {
+        let least_m = SPREAD.sqrt() * lattice_spacing_m / CUBE_PER_RADIUS;
+        self.settings.tip_radius_m.max(least_m)
+    }
+
     /// Returns the mean of trilinear weights over samples; those outside the body do not count.
     fn mean<T: Compiled>(&self, model: &BatchModel<T>, middle_m: f64, across: &[[f64; 2]]) -> Vec<(u32, f64)> {
         let mut all = Vec::new();
@@ -192,4 +216,9 @@ impl Stations {
         };
         weights.iter().map(entry).collect()
     }
+}
+
+/// Returns how far a newton moves a rigid sphere in its medium, times the sphere's radius, m²/N.
+fn sphere_m2_per_n(shear_pa: f64, nu: f64) -> f64 {
+    (5.0 - 6.0 * nu) / (24.0 * std::f64::consts::PI * shear_pa * (1.0 - nu))
 }

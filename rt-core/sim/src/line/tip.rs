@@ -47,11 +47,12 @@ impl LineModel {
         }
         let membrane_m = closed.map_or(f64::INFINITY, |(_, l)| l.from_m);
         let is_in_track = place_m < tip.track_m - SAME_M;
-        let ratio = if is_in_track {
-            self.settings.track_cutting_ratio
-        } else {
-            1.0
-        };
+        let here = self.layer_at(place_m + SAME_M);
+        let cutting_n = here.filter(|_| !is_in_track).map_or(0.0, |layer| layer.cutting_force_n);
+        let station = (place_m / self.compliance.spacing_m) as usize;
+        let wedge_n = here
+            .and(self.compliance.wedge_n.get(station))
+            .map_or(0.0, |wedge_n| *wedge_n);
         // The next place at which the force may be another.
         let places = self
             .layers
@@ -60,7 +61,7 @@ impl LineModel {
             .chain([0.0, self.length_m(), tip.track_m]);
         let next_m = places.filter(|&m| m > place_m + SAME_M).fold(membrane_m, f64::min);
         Front {
-            limit_n: ratio * self.layer_at(place_m + SAME_M).map_or(0.0, |l| l.cutting_force_n),
+            limit_n: cutting_n + wedge_n,
             to_m: next_m,
             membrane: None,
         }
@@ -145,6 +146,7 @@ impl<'a> Around<'a> {
             let at = n.saturating_sub(self.first).min(self.count.saturating_sub(1));
             let row = &c.rows.row(c.stations + n)[c.stations + range.start..];
             let own: f64 = row.iter().zip(&weights[..range.len()]).map(|(r, w)| r * w).sum();
+            let own = own + c.tip_missing_m_per_n[n];
             u_m += weight * (self.u_m[at] + self.tip_n * own + friction * c.rows.row(c.stations + n)[last]);
         }
         place_m + u_m - tip_m

@@ -45,8 +45,10 @@ pub struct Layer {
     pub puncture_depth_m: f64,
     /// Height of `F_R` (eq. 10): what the membrane resists with when it gives way.
     pub puncture_force_n: f64,
-    /// Resistance at the tip while it cuts.
+    /// Resistance at the tip while it cuts, by eq. 9; not on a line.
     pub cutting_force_n: f64,
+    /// Work that it takes to separate an area of the tissue, J/m²: cutting on a line.
+    pub toughness_j_per_m2: f64,
     /// `K_f` of eq. 9: friction for each metre of shaft in this layer.
     pub shaft_friction_n_per_m: f64,
 }
@@ -58,24 +60,28 @@ impl Layer {
             puncture_depth_m: 8e-3,
             puncture_force_n: 5.6,
             cutting_force_n: 1.5,
+            toughness_j_per_m2: 164.0,
             shaft_friction_n_per_m: 80.0,
         },
         Layer {
             puncture_depth_m: 12e-3,
             puncture_force_n: 9.0,
             cutting_force_n: 1.0,
+            toughness_j_per_m2: 200.0,
             shaft_friction_n_per_m: 40.0,
         },
         Layer {
             puncture_depth_m: 0.0,
             puncture_force_n: 0.0,
             cutting_force_n: 0.3,
+            toughness_j_per_m2: 50.0,
             shaft_friction_n_per_m: 15.0,
         },
         Layer {
             puncture_depth_m: 4e-3,
             puncture_force_n: 2.0,
             cutting_force_n: 0.8,
+            toughness_j_per_m2: 200.0,
             shaft_friction_n_per_m: 40.0,
         },
     ];
@@ -97,30 +103,34 @@ impl Default for Layers {
 }
 
 /// Key of each limit, so that a problem names its layer.
-const KEYS: [[&str; 4]; LAYER_COUNT] = [
+const KEYS: [[&str; 5]; LAYER_COUNT] = [
     [
         "gland.puncture_depth_m",
         "gland.puncture_force_n",
         "gland.cutting_force_n",
         "gland.shaft_friction_n_per_m",
+        "gland.toughness_j_per_m2",
     ],
     [
         "perineum.puncture_depth_m",
         "perineum.puncture_force_n",
         "perineum.cutting_force_n",
         "perineum.shaft_friction_n_per_m",
+        "perineum.toughness_j_per_m2",
     ],
     [
         "surroundings.puncture_depth_m",
         "surroundings.puncture_force_n",
         "surroundings.cutting_force_n",
         "surroundings.shaft_friction_n_per_m",
+        "surroundings.toughness_j_per_m2",
     ],
     [
         "wall.puncture_depth_m",
         "wall.puncture_force_n",
         "wall.cutting_force_n",
         "wall.shaft_friction_n_per_m",
+        "wall.toughness_j_per_m2",
     ],
 ];
 
@@ -138,6 +148,7 @@ impl Layers {
             problems.range(keys[1], layer.puncture_force_n, 0.0, 30.0);
             problems.range(keys[2], layer.cutting_force_n, 0.0, 20.0);
             problems.range(keys[3], layer.shaft_friction_n_per_m, 0.0, 1e3);
+            problems.range(keys[4], layer.toughness_j_per_m2, 0.0, 1e4);
         }
         problems.finish()
     }

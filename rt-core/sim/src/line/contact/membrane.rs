@@ -2,7 +2,7 @@
 
 use crate::line::model::LineModel;
 use crate::line::rows::dot;
-use crate::line::state::LineState;
+use crate::line::state::{LineState, TipState};
 
 /// Meets a membrane at the present place of the tissue: past loads and other needles may have moved it before the tip
 /// arrived.
@@ -23,18 +23,26 @@ pub(in crate::line) fn press(model: &LineModel, state: &mut LineState, membrane:
     let whole = model.compliance.common_m_per_n();
     let count = state.in_contact;
     let held_by = membrane.map_or(0, |n| n as u32 + 1);
+    let near = model
+        .compliance
+        .tip_missing_m_per_n(state.tip_range.clone(), &state.tip_weights);
+    let kept = membrane.and_then(|n| model.kept_of_dent(n, state.tip_own - near));
+    // A membrane that is stiffer than the tissue spreads the load over the patch, and no tissue is dented more narrowly.
+    let near = if kept.is_some_and(|kept| kept < 1.0) { near } else { 0.0 };
     if held_by != state.tip.held_by {
         let load_n = state.shaft_n[..count].iter().sum::<f64>() + state.tip.force_n;
         state.tip.met_u_m = if held_by == 0 { 0.0 } else { state.tip_u_m };
+        state.tip.ahead_m = state.memory.gain * near * state.tip.force_n;
         state.tip.met_dent_m = if held_by == 0 {
             0.0
         } else {
-            state.tip_u_m - whole_m(state, whole, load_n) - state.beside_whole_m
+            state.tip_u_m - whole_m(state, whole, load_n) - state.beside_whole_m - state.tip.ahead_m
         };
         state.tip.held_by = held_by;
     }
     (state.tip_offset_m, state.membrane_n_per_m) = (0.0, 0.0);
-    let kept = membrane.and_then(|n| model.kept_of_dent(n, state.tip_own))?;
+    let kept = kept?;
+    state.tip_own -= near;
     state.membrane_n_per_m = (1.0 / kept - 1.0) / (state.tip_own - whole);
     // Tissue that gives way within the tick leaves the spring more of the dent.
     let gain = state.memory.gain;
@@ -47,7 +55,7 @@ pub(in crate::line) fn press(model: &LineModel, state: &mut LineState, membrane:
     for of_tip in &mut state.tip_column[..count] {
         *of_tip = whole + kept * (*of_tip - whole);
     }
-    state.tip_offset_m = (1.0 - kept) * state.tip.met_dent_m;
+    state.tip_offset_m = (1.0 - kept) * state.tip.met_dent_m + state.tip.ahead_m;
     if state.memory.is_on() {
         // The spring leaves the same share of the dent by past loads.
         state.tip_offset_m -=
@@ -79,7 +87,8 @@ pub(super) fn whole_n(model: &LineModel, state: &LineState) -> f64 {
         return 0.0;
     }
     let load_n = state.shaft_n[..state.in_contact].iter().sum::<f64>() + state.tip.force_n;
-    let dent_m = state.tip_u_m - whole_m(state, model.compliance.common_m_per_n(), load_n) - state.beside_whole_m;
+    let moved_m = state.tip_u_m - state.tip.ahead_m;
+    let dent_m = moved_m - whole_m(state, model.compliance.common_m_per_n(), load_n) - state.beside_whole_m;
     state.membrane_n_per_m * (dent_m - state.tip.met_dent_m)
 }
 
@@ -123,6 +132,7 @@ impl Spring {
         let load_n = shaft.iter().sum::<f64>() + state.tip.force_n;
         let own_m = dot(&state.tip_column[..count], shaft) + state.tip_own * state.tip.force_n;
         let dent_m = self.gain * (own_m - self.common_m_per_n * load_n) + moved_m + state.tip_offset_m;
+        let dent_m = dent_m - state.tip.ahead_m;
         let past_m = state.memory.whole_offset_m + state.beside_whole_m;
         self.n_per_m * self.kept / self.gain * (dent_m - past_m - state.tip.met_dent_m)
     }
@@ -131,7 +141,7 @@ impl Spring {
     pub fn relaxed_j(&self, state: &LineState) -> f64 {
         let shaft = state.shaft_n.iter().zip(&state.tip_column).take(state.in_contact);
         let dent_j: f64 = shaft.map(|(f, of_tip)| f * (of_tip - self.common_m_per_n)).sum();
-        state.tip_offset_m / (state.tip_own - self.common_m_per_n) * dent_j
+        (state.tip_offset_m - state.tip.ahead_m) / (state.tip_own - self.common_m_per_n) * dent_j
     }
 
     /// Subtracts the spring's share from the stations.
@@ -140,6 +150,17 @@ impl Spring {
         for (u_m, of_tip) in state.u_m[..state.in_contact].iter_mut().zip(&state.tip_column) {
             *u_m -= by * (of_tip - self.common_m_per_n);
         }
+    }
+}
+
+impl TipState {
+    /// Draws the tip back by `by_m` through what it had dented before it met the membrane; returns whether there was
+    /// any. No force is on it there.
+    pub(in crate::line) fn draw_back(&mut self, by_m: f64) -> bool {
+        let back_m = by_m.min(self.ahead_m);
+        self.ahead_m -= back_m;
+        self.met_u_m -= back_m;
+        back_m > 0.0
     }
 }
 
@@ -159,7 +180,8 @@ impl LineState {
             return 0.5 * (shaft_j + tip_j - relaxed_j) / self.memory.gain + self.memory.held_j;
         }
         let shaft = self.shaft_n.iter().zip(&self.u_m).take(self.in_contact);
-        let moved_j = 0.5 * (shaft.map(|(f, u)| f * u).sum::<f64>() + self.tip.force_n * self.tip_u_m);
+        let tip_j = self.tip.force_n * (self.tip_u_m - self.tip.ahead_m);
+        let moved_j = 0.5 * (shaft.map(|(f, u)| f * u).sum::<f64>() + tip_j);
         moved_j - 0.5 * (self.whole_n * self.tip.met_dent_m + self.outside_j())
     }
 }

@@ -62,6 +62,8 @@ impl LeftNeedles {
                 for i in 0..=a.stations {
                     for j in 0..=b.stations {
                         let pairs = a.rows(i).flat_map(|(p, w)| b.rows(j).map(move |(q, v)| (p, q, w * v)));
+                        let is_tip = is_same && i == a.stations && j == a.stations;
+                        let missing = if is_tip { a.line.tip_missing_m_per_n() } else { 0.0 };
                         let entry: f64 = pairs
                             .map(|(p, q, w)| {
                                 w * if is_same {
@@ -70,7 +72,8 @@ impl LeftNeedles {
                                     joined.map_or(0.0, |joined| joined.at(p, q))
                                 }
                             })
-                            .sum();
+                            .sum::<f64>()
+                            + missing;
                         self.own[(a.first + i) * self.stride + b.first + j] = entry;
                         self.own[(b.first + j) * self.stride + a.first + i] = entry;
                     }

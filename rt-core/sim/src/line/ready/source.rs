@@ -64,6 +64,7 @@ impl LineSource {
         let bone = |s: &LineSource| s.way.bone_m.map(f64::to_bits);
         let sizes = |s: &LineSource| bits(&[s.compliance.spacing_m, s.compliance.tip_length_m]);
         let row = |s: &LineSource, n| bits(s.compliance.rows.row(n));
+        let tip = |s: &LineSource| [bits(&s.compliance.tip_missing_m_per_n), bits(&s.compliance.wedge_n)];
         let across = |s: &LineSource| {
             let each = s.compliance.across.iter();
             let rows = |rows: &Rows| (0..rows.size()).map(|n| bits(rows.row(n))).collect::<Vec<_>>();
@@ -77,6 +78,7 @@ impl LineSource {
             && kinds(self) == kinds(other)
             && bone(self) == bone(other)
             && sizes(self) == sizes(other)
+            && tip(self) == tip(other)
             && across(self) == across(other)
             && (0..2 * self.stations()).all(|n| row(self, n) == row(other, n))
     }
@@ -155,7 +157,7 @@ impl HandLine {
         let is_whole = compliance.rows.is_whole(2 * compliance.stations)
             && (across == 0
                 || (first.is_whole(across) && second.is_whole(across) && compliance.across_spacing_m > 0.0));
-        if compliance.stations > MAX_STATIONS || across > MAX_ACROSS || !is_whole {
+        if compliance.stations > MAX_STATIONS || across > MAX_ACROSS || !is_whole || !compliance.has_whole_tip() {
             return Err(LineError::Compliance);
         }
         let mut line = Self {

@@ -2,10 +2,8 @@
 
 use super::HandLine;
 use crate::line::Line;
+use crate::line::stations::NEEDLE_RADIUS_M;
 use serde::{Deserialize, Serialize};
-
-/// Radius of a needle, m (18 G): within it of a track a needle is in it.
-const WITHIN_M: f64 = 0.635e-3;
 
 /// Track that a needle has cut, with the membranes that it went through.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,7 +31,7 @@ impl HandLine {
         })
     }
 
-    /// Finds `track` open where the needle goes in it all the way, within its radius; does not allocate. For a line
+    /// Finds `track` open where the needle goes in it all the way, within the radius of a needle; does not allocate. For a line
     /// that no needle is on.
     pub fn open_track(&mut self, track: &Track) {
         let axis = self.line.axes[0];
@@ -45,7 +43,8 @@ impl HandLine {
             (along_m, beside_m.sqrt())
         };
         let ((begin_m, beside_begin_m), (end_m, beside_end_m)) = (off_m(0.0), off_m(track.end_m));
-        if self.is_in_tissue() || beside_begin_m > WITHIN_M || beside_end_m > WITHIN_M || begin_m > end_m {
+        if self.is_in_tissue() || beside_begin_m > NEEDLE_RADIUS_M || beside_end_m > NEEDLE_RADIUS_M || begin_m > end_m
+        {
             return;
         }
         let is_open = |(from_m, kind): (f64, u8)| track.opened >> kind & 1 == 1 && from_m <= end_m;

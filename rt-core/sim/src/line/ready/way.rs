@@ -3,6 +3,7 @@
 use super::LayerForces;
 use crate::line::Line;
 use crate::line::model::{LineLayer, MAX_LAYERS, MAX_STATIONS};
+use crate::line::stations::NEEDLE_RADIUS_M;
 use crate::needle::LayerKind;
 use crate::scene::Lattice;
 use serde::{Deserialize, Serialize};
@@ -81,7 +82,7 @@ pub(super) fn layer(forces: &LayerForces, &(from_m, kind, has_membrane): &(f64, 
         } else {
             f64::INFINITY
         },
-        cutting_force_n: forces.cutting_gain * layer.cutting_force_n,
+        cutting_force_n: forces.cutting_gain * 2.0 * NEEDLE_RADIUS_M * layer.toughness_j_per_m2,
         shaft_friction_n_per_m: forces.shaft_gain * layer.shaft_friction_n_per_m,
     }
 }

@@ -1,14 +1,15 @@
 //! A needle that bends, on a line of the loops.
 
 use super::*;
-use crate::line::{Compliance, LayerForces, Line, Rows};
+use crate::line::{Compliance, LayerForces, Line, NEEDLE_RADIUS_M, Rows};
+use crate::needle::{LayerKind, Layers};
 use nalgebra::Unit;
 
 const STIFFNESS_PA: f64 = 44e3;
 const ACROSS_M: f64 = 4e-3;
 const STATIONS: usize = 128;
 const EI: f64 = 0.016;
-/// A hundredth of the gland's.
+/// Much less than the gland's.
 const CUT_N: f64 = 0.015;
 
 /// Makes a line along z in a uniform medium of springs, with stations across as in the loops.
@@ -24,7 +25,7 @@ fn uniform(settings: &NeedleBending) -> (HandLine, LayerForces) {
     let forces = LayerForces {
         membrane_gain: 0.0,
         shaft_gain: 0.0,
-        cutting_gain: 0.01,
+        cutting_gain: CUT_N / (2.0 * NEEDLE_RADIUS_M * Layers::default().of(LayerKind::Gland).toughness_j_per_m2),
         bending: *settings,
         ..LayerForces::default()
     };
