@@ -110,12 +110,12 @@ pub use request::{
 pub use scene::{SceneHeader, SceneId, StructureInfo, UploadHeader, UploadStructure, role};
 pub use second::{SecondRecord, SecondState};
 pub use session::{Session, ThreadReport};
-pub use snapshot::{LeftNeedlePose, MAX_BEND_POINTS, SeedPose, SnapshotHeader, Vertex};
+pub use snapshot::{LeftNeedlePose, MAX_BEND_POINTS, SeedPose, SnapshotHeader, Vertex, touching};
 pub use state::{Fault, HapticState, Phase, flags};
 pub use stylet_settings::{
     BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_LEFT_NEEDLES, MAX_NODES, MAX_STRUCTURES, PARAMETER_COUNT,
     PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet, ParameterSpec,
-    ProblemList, folding,
+    ProblemList, SEED_LENGTH_M, SEED_RADIUS_M, folding,
 };
 pub use text::Text;
 

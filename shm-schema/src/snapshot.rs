@@ -1,6 +1,6 @@
 //! The deformed gland, written by the tissue thread and copied to hosts by the bridge.
 
-use crate::{MAX_LEFT_NEEDLES, MAX_SEEDS, SceneId};
+use crate::{MAX_LEFT_NEEDLES, MAX_SEEDS, SEED_LENGTH_M, SEED_RADIUS_M, SceneId};
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
@@ -13,17 +13,45 @@ pub struct Vertex {
     pub position_m: [f32; 3],
 }
 
+/// Cosine of the angle between two seeds of one track, at least.
+const PARALLEL: f64 = 0.9;
+/// Largest gap between two seeds that touch, m.
+const TOUCHING_M: f64 = 1e-4;
+
 /// Present pose of a seed.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
 pub struct SeedPose {
-    /// Centre of the seed in the body at its place in the scene, scene frame, m: if the body is moved, the seed is
+    /// Middle of the seed in the body at its place in the scene, scene frame, m: if the body is moved, the seed is
     /// displaced by [`SnapshotHeader::body_moved_m`].
     pub position_m: [f64; 3],
     /// Unit vector along the seed; it turns with the tissue.
     pub axis: [f64; 3],
-    /// Tip at the drop, in the body at its place in the scene.
+    /// Middle of the seed when the needle left it, half a seed behind the tip, in the body at its place in the scene.
     pub dropped_at_m: [f64; 3],
+}
+
+impl SeedPose {
+    /// Returns whether both lie end to end in one track, to a tenth of a millimetre.
+    pub fn touches(&self, other: &SeedPose) -> bool {
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let apart_m = [0, 1, 2].map(|a| self.position_m[a] - other.position_m[a]);
+        let along_m = dot(apart_m, self.axis);
+        let beside_m2 = dot(apart_m, apart_m) - along_m * along_m;
+        dot(self.axis, other.axis) > PARALLEL
+            && beside_m2 < (2.0 * SEED_RADIUS_M).powi(2)
+            && along_m.abs() < SEED_LENGTH_M + TOUCHING_M
+    }
+}
+
+/// Returns the numbers, from 1, of the seeds that seed `number`, counted from 0, touches.
+pub fn touching(seeds: &[SeedPose], number: usize) -> Vec<usize> {
+    let others = seeds.iter().enumerate().filter(|(other, _)| *other != number);
+    let touches = |pose: &SeedPose| seeds.get(number).is_some_and(|seed| seed.touches(pose));
+    others
+        .filter(|(_, pose)| touches(pose))
+        .map(|(other, _)| other + 1)
+        .collect()
 }
 
 /// Most points along a bent needle in a snapshot.

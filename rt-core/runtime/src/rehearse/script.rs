@@ -4,16 +4,19 @@ use super::RehearseError;
 use super::rig::Rig;
 use nalgebra::Vector3;
 use stylet_procedure::{HandRequest, NeedleWay, Next, Observed, Pace, Procedure, Reply};
-use stylet_shm_schema::NeedleRehearsal;
+use stylet_shm_schema::{NeedleRehearsal, SEED_LENGTH_M};
 
 pub struct Script(Procedure);
 
 impl Script {
-    fn way(run: &NeedleRehearsal) -> (NeedleWay, Pace) {
+    pub fn way(run: &NeedleRehearsal) -> (NeedleWay, Pace) {
+        let (entry_m, direction) = (Vector3::from(run.entry_m), Vector3::from(run.direction));
+        // The seed lies in the needle with its deeper end at the tip.
+        let tip_m = |middle_m: &[f64; 3]| Vector3::from(*middle_m) + direction * (0.5 * SEED_LENGTH_M);
         let way = NeedleWay {
-            entry_m: run.entry_m.into(),
-            direction: run.direction.into(),
-            drops_m: run.drops_m.iter().map(|&drop| drop.into()).collect(),
+            entry_m,
+            direction,
+            drops_m: run.drops_m.iter().map(tip_m).collect(),
             retract_to_m: run.retract_to_m,
             strand_pitch_m: run.strand_pitch_m,
         };

@@ -6,7 +6,7 @@ use super::{Motion, RehearseError, Rehearsed, Stage, drive, perform};
 use nalgebra::Vector3;
 use std::sync::atomic::AtomicBool;
 use stylet_hw::Hand;
-use stylet_shm_schema::{NeedleRehearsal, ParameterSet, StabilisingNeedle};
+use stylet_shm_schema::{NeedleRehearsal, ParameterSet, SEED_LENGTH_M, StabilisingNeedle};
 use stylet_sim::active::Active;
 use stylet_sim::line::{LeftRecord, ReadyLine};
 
@@ -138,11 +138,13 @@ impl Stage {
         before: &LeftRecord,
         stop: &AtomicBool,
     ) -> Result<LeftRecord, RehearseError> {
-        let to_m = Vector3::from(needle.entry_m) + Vector3::from(needle.direction) * needle.depth_m;
+        // A seed that would lie in its tip.
+        let middle_m = needle.depth_m - 0.5 * SEED_LENGTH_M;
+        let drop_m = Vector3::from(needle.entry_m) + Vector3::from(needle.direction) * middle_m;
         let run = NeedleRehearsal {
             entry_m: needle.entry_m,
             direction: needle.direction,
-            drops_m: vec![to_m.into()],
+            drops_m: vec![drop_m.into()],
             stabilising: Vec::new(),
             earlier: Vec::new(),
             ..run.clone()

@@ -16,6 +16,7 @@ mod migration;
 mod order;
 mod paper;
 mod probe;
+mod rest;
 mod sequence;
 
 fn stage_of(tissue: TissueKind) -> Stage {
@@ -78,7 +79,8 @@ fn a_rehearsal_leaves_its_seeds_off_plan_and_repeats_bit_by_bit() {
 #[test]
 fn a_strand_keeps_its_pitch_and_rests_in_balance() {
     let (mut stage, mut run, stop) = (stage(), needle(), AtomicBool::new(false));
-    let set = ParameterSet::default();
+    let mut set = ParameterSet::default();
+    set.set(ParameterId::ShaftFriction, 50.0);
     let along = |r: &Rehearsed| r.seeds.iter().map(|s| s.position_m[2]).collect::<Vec<_>>();
     let loose = stage.rehearse(&run, &set, &stop).expect("goes through");
     let pitch_m = run.drops_m[0][2] - run.drops_m[1][2];
@@ -254,36 +256,37 @@ fn in_chainmail_seeds_rest_where_they_do_at_any_speed_and_near_their_plan() {
 }
 
 fn seeds_rest_at_any_speed(tissue: TissueKind) {
-    let (mut stage, stop) = (stage_of(tissue), AtomicBool::new(false));
-    let set = ParameterSet::default();
-    let mut rehearse = |speed_m_per_s: f64| {
+    let mut stage = stage_of(tissue);
+    // So far apart that none touches the other.
+    let plan = [0, 2].map(|n| needle().drops_m[n]).to_vec();
+    let mut follow = |speed_m_per_s: f64| {
         let run = NeedleRehearsal {
             insert_m_per_s: speed_m_per_s,
             retract_m_per_s: speed_m_per_s,
+            drops_m: plan.clone(),
             ..needle()
         };
-        stage.rehearse(&run, &set, &stop).expect("goes through")
+        rest::seeds_and_turns(&mut stage, &run)
     };
-    let plan = needle().drops_m;
-    let runs = [2e-3, 0.01, 0.05, 0.123].map(|speed| (speed, rehearse(speed)));
+    let runs = [2e-3, 0.01, 0.05, 0.123].map(|speed| (speed, follow(speed)));
     for (speed, run) in &runs {
-        println!(
-            "{:.0} mm/s: peak {:.2} N, before puncture {:.2} mm",
-            speed * 1e3,
-            run.peak_force_n,
-            run.displacement_before_puncture_m * 1e3
-        );
-        for (seed, drop) in run.seeds.iter().zip(&plan) {
+        println!("{:.0} mm/s", speed * 1e3);
+        for ((seed, turn_m), drop) in run.iter().zip(&plan) {
             let off = Vector3::from(seed.position_m) - Vector3::from(*drop);
             let at = Vector3::from(seed.dropped_at_m) - Vector3::from(*drop);
-            println!("   {:.3} mm, tip at the drop {:.3} mm", off.z * 1e3, at.z * 1e3);
+            println!(
+                "   {:.3} mm, tip at the drop {:.3} mm, turned at {:.3} mm",
+                off.z * 1e3,
+                at.z * 1e3,
+                (turn_m - drop[2]) * 1e3
+            );
             assert!(off.norm() < 15e-3, "{off:?}");
         }
     }
-    // The hand stops within 0.3 mm of its goal, before or behind it; a seed in stretched tissue follows that.
-    let apart_m = |a: &Rehearsed, b: &Rehearsed| {
-        let pairs = a.seeds.iter().zip(&b.seeds);
-        let apart = pairs.map(|(a, b)| (Vector3::from(a.position_m) - Vector3::from(b.position_m)).norm());
+    // The hand turns up to 0.6 mm beyond its goal, by its speed; a seed in stretched tissue follows that.
+    let apart_m = |a: &[(SeedPose, f64)], b: &[(SeedPose, f64)]| {
+        let pairs = a.iter().zip(b);
+        let apart = pairs.map(|((a, at_m), (b, bt_m))| ((a.position_m[2] - at_m) - (b.position_m[2] - bt_m)).abs());
         apart.fold(0.0, f64::max)
     };
     let [slow, _, usual, fast] = runs.each_ref().map(|(_, run)| run);

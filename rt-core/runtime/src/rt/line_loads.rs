@@ -3,8 +3,8 @@
 use crate::rt::left_loads::LeftLoads;
 use crate::rt::taped;
 use serde::{Deserialize, Serialize};
-use stylet_sim::line::MAX_STATIONS;
 use stylet_sim::line::beam::{BentNeedle, MAX_ACROSS};
+use stylet_sim::line::{MAX_STATIONS, SeedHold};
 
 /// Shaft and tip of each station, and stations across along both directions.
 pub(crate) const MOST: usize = 2 * MAX_STATIONS + 2 * MAX_ACROSS;
@@ -31,6 +31,8 @@ pub struct LineLoads {
     pub tip_displacement_m: f64,
     /// Additional displacement of the whole body along the line, m.
     pub whole_m: f64,
+    /// Hold of that material on a seed in the track.
+    pub hold: SeedHold,
     /// The needle, if it bends.
     pub bent: Option<BentTip>,
     /// Stations across; none for a needle that does not bend.
@@ -97,6 +99,7 @@ impl Default for LineLoads {
             tip_material_m: 0.0,
             tip_displacement_m: 0.0,
             whole_m: 0.0,
+            hold: SeedHold::default(),
             bent: None,
             across: 0,
             count: 0,

@@ -2,19 +2,19 @@
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use stylet_shm_schema::SeedPose;
+use stylet_shm_schema::{SEED_LENGTH_M, SeedPose};
 use stylet_sim::tissue::{Deformed, MaterialPoint};
 
 /// A seed left in the tissue.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Seed {
-    /// Tip of the needle at the drop.
+    /// Its deeper end.
     pub tip: MaterialPoint,
     /// The other end; `None` if it was outside the tissue.
     pub tail: Option<MaterialPoint>,
     /// Direction of the needle at the drop, unit vector; the axis if the tail is unknown.
     pub axis: [f64; 3],
-    /// Place of the tip at the drop, scene frame, m.
+    /// Middle of the seed at the drop, scene frame, m.
     pub dropped_at_m: [f64; 3],
     /// Pitch to the seed before it, centre to centre, m, if a spacer joins them.
     pub strand_pitch_m: Option<f64>,
@@ -49,14 +49,14 @@ pub fn poses<'a>(seeds: &'a [Seed], body: Deformed<'a>) -> impl Iterator<Item = 
 impl Seed {
     /// Position and axis of a single seed in the deformed body, scene frame.
     fn pose(&self, body: &Deformed<'_>) -> SeedPose {
-        let position_m = self.tip.position_m(body);
-        let along = self
-            .tail
-            .map(|tail| Vector3::from(position_m) - Vector3::from(tail.position_m(body)));
-        let axis = along.and_then(|a| a.try_normalize(1e-9)).map_or(self.axis, Into::into);
+        let tip_m = Vector3::from(self.tip.position_m(body));
+        let tail_m = self.tail.map(|tail| Vector3::from(tail.position_m(body)));
+        let axis = tail_m.and_then(|tail_m| (tip_m - tail_m).try_normalize(1e-9));
+        let axis = axis.unwrap_or_else(|| self.axis.into());
+        let middle_m = tail_m.map_or_else(|| tip_m - axis * (0.5 * SEED_LENGTH_M), |tail_m| 0.5 * (tip_m + tail_m));
         SeedPose {
-            position_m,
-            axis,
+            position_m: middle_m.into(),
+            axis: axis.into(),
             dropped_at_m: self.dropped_at_m,
         }
     }

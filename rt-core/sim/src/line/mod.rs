@@ -24,6 +24,7 @@
 
 mod across;
 pub mod beam;
+mod column;
 mod columns;
 mod compliance;
 mod contact;
@@ -38,6 +39,7 @@ mod state;
 mod stations;
 mod tip;
 
+pub use column::{SeedHold, push};
 pub use columns::{Column, ColumnQueue, Load, QueueProgress, TOLERANCE};
 pub use compliance::Compliance;
 pub use contact::{LineInput, step};

@@ -14,8 +14,8 @@ impl Digest {
     }
 }
 
-/// Digests tip, force, torque, depth, speed and displacement of every tick, then the seeds and the largest force. Adds
-/// every 200th tick and the seeds to a trace.
+/// Digests tip, force, torque, depth, speed and displacement of every tick, then the deeper ends of the seeds, which were
+/// their places once, and the largest force. Adds every 200th tick and those ends to a trace.
 fn digest(stage: &mut Stage, run: &NeedleRehearsal, case: f64, trace: &mut Vec<Vec<f64>>) -> u64 {
     let active = activate(&ParameterSet::default(), &stage.device).expect("valid");
     let mut world = stage.world.take().expect("given back");
@@ -44,15 +44,9 @@ fn digest(stage: &mut Stage, run: &NeedleRehearsal, case: f64, trace: &mut Vec<V
             break;
         }
     }
-    for seed in rig.seeds() {
-        all.take(&seed.position_m);
-        trace.push(vec![
-            case,
-            -1.0,
-            seed.position_m[0],
-            seed.position_m[1],
-            seed.position_m[2],
-        ]);
+    for [x_m, y_m, z_m] in rig.tissue().deeper_ends_m() {
+        all.take(&[x_m, y_m, z_m]);
+        trace.push(vec![case, -1.0, x_m, y_m, z_m]);
     }
     all.take(&[rig.state().peak_force_n]);
     stage.world = Some(rig.into_world());
@@ -67,7 +61,9 @@ fn through(scene: &str, speed_m_per_s: f64, beside_m: f64) -> (Stage, NeedleRehe
     let (low, high) = built.target_bounds_m();
     let (outside, _) = built.lattice.bounds_m();
     let (x, y) = ((low[0] + high[0]) / 2.0 + beside_m, (low[1] + high[1]) / 2.0);
-    let at = |share: f64| [x, y, low[2] + share * (high[2] - low[2])];
+    let half_a_seed_m = 0.5 * stylet_shm_schema::SEED_LENGTH_M;
+    // The tip stops half a seed deeper.
+    let at = |share: f64| [x, y, low[2] + share * (high[2] - low[2]) - half_a_seed_m];
     let run = NeedleRehearsal {
         entry_m: [x, y, outside[2] - 0.01],
         insert_m_per_s: speed_m_per_s,
@@ -100,7 +96,7 @@ fn the_paper_as_printed_keeps_its_bits() {
             found.push(digest(&mut stage, &run, case, &mut trace));
         }
     }
-    // Rows of a seed have the tick -1 and its place.
+    // Rows of a seed have the tick -1 and the place of its deeper end.
     let columns = [
         "case",
         "tick",

@@ -2,8 +2,10 @@
 //! each.
 
 use super::left::stabilised;
+use super::script::Script;
 use super::*;
 use stylet_procedure::{HandRequest, NeedleWay, Next, Observed, Pace, Procedure, Reply};
+use stylet_shm_schema::SEED_LENGTH_M;
 
 /// Offsets from the gland's centre, m: in the order of a plan, from hole to hole.
 const OFF_M: [[f64; 2]; 8] = [
@@ -16,16 +18,6 @@ const OFF_M: [[f64; 2]; 8] = [
     [-4e-3, -7e-3],
     [4e-3, -8e-3],
 ];
-
-fn way(run: &NeedleRehearsal) -> NeedleWay {
-    NeedleWay {
-        entry_m: run.entry_m.into(),
-        direction: run.direction.into(),
-        drops_m: run.drops_m.iter().map(|&drop| drop.into()).collect(),
-        retract_to_m: run.retract_to_m,
-        strand_pitch_m: run.strand_pitch_m,
-    }
-}
 
 /// Seeds of all needles, once those that stayed in are out.
 fn carried_out(stage: &mut Stage, runs: &[NeedleRehearsal]) -> Vec<SeedPose> {
@@ -60,8 +52,8 @@ fn carried_out(stage: &mut Stage, runs: &[NeedleRehearsal]) -> Vec<SeedPose> {
             strand_pitch_m: None,
         }
     };
-    let mut script =
-        Procedure::of_needles(runs.iter().map(way).collect(), pace).stabilised(stabilising.iter().map(ways).collect());
+    let mut script = Procedure::of_needles(runs.iter().map(|run| Script::way(run).0).collect(), pace)
+        .stabilised(stabilising.iter().map(ways).collect());
     let mut drawn = 0;
     loop {
         rig.tick();
@@ -129,7 +121,7 @@ fn pass(run: &NeedleRehearsal) -> StabilisingNeedle {
     StabilisingNeedle {
         entry_m: run.entry_m,
         direction: run.direction,
-        depth_m: (Vector3::from(run.drops_m[0]) - Vector3::from(run.entry_m)).norm(),
+        depth_m: (Vector3::from(run.drops_m[0]) - Vector3::from(run.entry_m)).norm() + 0.5 * SEED_LENGTH_M,
     }
 }
 

@@ -128,6 +128,7 @@ impl HapticLoop {
             tip_material_m: state.tip().material_m,
             tip_displacement_m: line.tip_displacement_m(),
             whole_m: line.whole_m(),
+            hold: line.seed_hold(),
             bent: output.bent.as_ref().map(bent_tip),
             across: across[0].len(),
             ..LineLoads::default()

@@ -152,15 +152,17 @@ impl TissueLoop {
         }
     }
 
-    /// Returns the material at the tip of the last pose and `behind_m` behind it, along the line; `None` if the needle
-    /// is in no tissue along one.
-    pub(super) fn material_on_line(&self, behind_m: f64) -> Option<[Option<MaterialPoint>; 2]> {
+    /// Returns the line that the needle is in tissue on.
+    pub(super) fn line_in_tissue(&self) -> Option<Line> {
         let loads = &self.state.loads;
         let line = self.line.as_ref().filter(|line| line.generation == loads.generation)?;
+        loads.in_tissue.then_some(line.line)
+    }
+
+    /// Returns the material in the track of the needle on its line, so far from the entry.
+    pub(super) fn material_on_line(&self, line: &Line, along_m: f64) -> Option<MaterialPoint> {
+        let loads = &self.state.loads;
         let tip_m = loads.tip_material_m;
-        if !loads.in_tissue {
-            return None;
-        }
         let across_m = |behind_m: f64| {
             let (here, there) = (loads.deflection_m(0.0), loads.deflection_m(behind_m));
             loads.bent.map_or([0.0; 2], |bent| {
@@ -168,13 +170,10 @@ impl TissueLoop {
                 [0, 1].map(|side| tip_m[side] + there[side] - here[side])
             })
         };
-        let at = |along_m: f64| {
-            let place_m = line.line.point_m(along_m, across_m(tip_m - along_m));
-            (along_m > 0.0)
-                .then(|| MaterialPoint::at_rest(&self.world.scene.body, place_m))
-                .flatten()
-        };
-        Some([at(tip_m), at(tip_m - behind_m)])
+        let place_m = line.point_m(along_m, across_m(tip_m - along_m));
+        (along_m > 0.0)
+            .then(|| MaterialPoint::at_rest(&self.world.scene.body, place_m))
+            .flatten()
     }
 }
 

@@ -2,9 +2,10 @@
 
 use super::TissueLoop;
 use crate::rt::seed::Seed;
+use nalgebra::Vector3;
 use stylet_random::Random;
+use stylet_shm_schema::{SEED_LENGTH_M, SEED_RADIUS_M};
 use stylet_sim::migration::Migration;
-use stylet_sim::tissue::MaterialPoint;
 
 impl Seed {
     /// True if the seed belongs to the share that migrates: chosen by its position, so that each run moves the same
@@ -26,13 +27,12 @@ impl TissueLoop {
             return;
         }
         let by_m = speed_m_per_s * self.period_s;
-        let body = &self.world.scene.body;
         for index in 0..self.seeds.len() {
             let is_joined = self
                 .seeds
                 .get(index + 1)
                 .is_some_and(|next| next.strand_pitch_m.is_some());
-            let Some(seed) = self.seeds.get_mut(index) else {
+            let Some(seed) = self.seeds.get(index) else {
                 continue;
             };
             let Some(along) = seed
@@ -44,22 +44,34 @@ impl TissueLoop {
             if !seed.migrates(index, share) {
                 continue;
             }
-            let moved = |point: &MaterialPoint| {
-                let place_m = point.rest_m(body);
-                MaterialPoint::at_rest(body, [0, 1, 2].map(|a| place_m[a] + along[a] * by_m))
-            };
-            // At the end of the track, where the body ends, it stays.
-            match (moved(&seed.tip), seed.tail.as_ref().map(moved)) {
-                (Some(tip), tail) => (seed.tip, seed.tail) = (tip, tail.flatten()),
-                (None, _) => seed.track_to_entry = None,
+            // It stays where it meets the next seed, and where the body ends.
+            let by_m = self.room_m(index, along.into()).min(by_m);
+            if by_m > 0.0 {
+                self.shift_seed(index, along.map(|c| c * by_m));
             }
         }
+    }
+
+    /// Returns the way of a seed along its track to the next one, m.
+    fn room_m(&self, index: usize, along: Vector3<f64>) -> f64 {
+        let body = &self.world.scene.body;
+        let place_m = |seed: &Seed| Vector3::from(seed.tip.rest_m(body));
+        let own_m = place_m(&self.seeds[index]);
+        let to_m = |(_, other): (usize, &Seed)| {
+            let off_m = place_m(other) - own_m;
+            let ahead_m = off_m.dot(&along);
+            let is_in_track = (off_m - along * ahead_m).norm() < 2.0 * SEED_RADIUS_M;
+            (is_in_track && ahead_m > 0.0).then_some(ahead_m - SEED_LENGTH_M)
+        };
+        let others = self.seeds.iter().enumerate().filter(|(number, _)| *number != index);
+        others.filter_map(to_m).fold(f64::INFINITY, f64::min)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stylet_sim::tissue::MaterialPoint;
 
     /// As many as in patients: 0.47 % of 19,236. Chance expects 90, with its square root as the deviation.
     #[test]
