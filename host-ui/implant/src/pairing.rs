@@ -69,7 +69,7 @@ pub fn nearest(planned_m: &[[f64; 3]], dropped_at_m: &[[f64; 3]]) -> Vec<Option<
 /// is held back counts as arrived within 2 mm.
 const DROPPED_WITHIN_M: f64 = 2.5e-3;
 
-/// Returns which of the planned drops were made, by the place of the tip when seeds left it.
+/// Returns which of the planned drops were made, by the places at which seeds left the needle.
 pub fn made(drops_m: &[[f64; 3]], dropped_at_m: &[[f64; 3]]) -> Vec<bool> {
     let seeds = nearest(drops_m, dropped_at_m);
     let is_near = |(drop_m, seed): (&[f64; 3], &Option<usize>)| {

@@ -19,7 +19,7 @@ pub use seeds::{SeedError, all_errors, own_errors};
 use std::sync::Arc;
 use stylet_controllers::Latest;
 use stylet_host::link::{Link, LinkStatus};
-use stylet_implant::plan::{HOLES, Template};
+use stylet_implant::plan::{HOLES, SEED_LENGTH_M, Template};
 use stylet_implant::received::ReceivedSeed;
 use stylet_implant::workflow::{Step, Waiting};
 use stylet_shm_schema::{
@@ -255,7 +255,7 @@ impl Shown {
     /// Returns the depth of the tip when the planned seed leaves it, with compensation.
     fn drop_depth_m(&self, plan: &PlanInForce, number: usize) -> f64 {
         let planned_m = || along(plan, self.planned()[number].position_m);
-        self.planning.drops_m().get(number).copied().unwrap_or_else(planned_m)
+        self.planning.drops_m().get(number).copied().unwrap_or_else(planned_m) + 0.5 * SEED_LENGTH_M
     }
 
     /// Returns how far the needle may go along the path.

@@ -2,11 +2,9 @@
 
 use nalgebra::{Unit, Vector3};
 use serde::Deserialize;
-use stylet_shm_schema::{MAX_SEEDS, ProblemList};
+use stylet_shm_schema::{MAX_SEEDS, ProblemList, SEED_LENGTH_M};
 
 const FORMAT: &str = "stylet plan, mm, RAS";
-/// Length from end to end of a seed; with a spacer the pitch of a strand.
-const SEED_LENGTH_MM: f64 = 4.5;
 const FARTHEST_MM: f64 = 10_000.0;
 const LONGEST_MM: f64 = 500.0;
 
@@ -185,7 +183,7 @@ fn checked(file: NeedleFile, problems: &mut Vec<NeedleProblem>) -> Needle {
         entry_mm: file.entry_mm.into(),
         direction: Unit::new_normalize(direction),
         retract_to_mm: file.retract_to_mm,
-        strand_pitch_mm: file.spacer_mm.map(|spacer| SEED_LENGTH_MM + spacer),
+        strand_pitch_mm: file.spacer_mm.map(|spacer| SEED_LENGTH_M * 1e3 + spacer),
         seeds,
     }
 }

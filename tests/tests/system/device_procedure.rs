@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 use stylet_host::link::Link;
 use stylet_implant::workflow::{Pace, Run, RunStatus, Step, default_plan};
-use stylet_shm_schema::{Event, EventKind, Fault, PlannedNeedle, Request, TickRecord, flags};
+use stylet_shm_schema::{Event, EventKind, Fault, PlannedNeedle, Request, SEED_LENGTH_M, TickRecord, flags};
 use stylet_tests::phantom::library;
 use stylet_tests::stopped::{StoppedThread, is_dead};
 use stylet_tests::witness::where_the_machine_runs;
@@ -77,11 +77,13 @@ impl Rig {
 
 /// Returns the goal of the operator's hand for the script's present step.
 fn goal(run: &Run, plan: &PlannedNeedle, seeds_dropped: usize) -> Option<[f64; 3]> {
+    // A seed leaves with its deeper end at the tip.
+    let tip_m = |seed_m: &[f64; 3]| [0, 1, 2].map(|a| seed_m[a] + plan.direction[a] * 0.5 * SEED_LENGTH_M);
     match run.step() {
         Step::Plan | Step::Done => None,
         Step::Place => Some(plan.entry_m),
-        Step::Insert => plan.seeds_m.first().copied(),
-        Step::Drop => plan.seeds_m.get(seeds_dropped).copied(),
+        Step::Insert => plan.seeds_m.first().map(tip_m),
+        Step::Drop => plan.seeds_m.get(seeds_dropped).map(tip_m),
         Step::Retract | Step::Settle => Some(plan.entry_m),
     }
 }

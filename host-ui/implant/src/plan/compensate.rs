@@ -29,7 +29,7 @@ pub struct Limits {
     pub along_m: f64,
     /// Largest shift of the needle across; 0 keeps it in its hole.
     pub across_m: f64,
-    /// Deepest that the tip may go, from the entry.
+    /// Deepest that the needle may leave the middle of a seed, from the entry.
     pub reach_m: f64,
     /// Most rehearsals of one needle, the first one included, until its drops are found; those for
     /// edges are extra.
@@ -43,7 +43,7 @@ impl Default for Limits {
         Self {
             along_m: 15e-3,
             across_m: 1.5e-3,
-            reach_m: super::check::REACH_M,
+            reach_m: super::check::REACH_M - 0.5 * super::SEED_LENGTH_M,
             rehearsals: 30,
             enough_m: 0.1e-3,
         }

@@ -3,9 +3,8 @@
 use super::template::Hole;
 use nalgebra::Vector3;
 use stylet_dose::Seed;
+pub use stylet_shm_schema::SEED_LENGTH_M;
 
-/// Length of a seed from end to end.
-pub const SEED_LENGTH_M: f64 = 4.5e-3;
 /// Usual spacer between two seeds of a strand; seeds then lie 10 mm apart.
 pub const SPACER_M: f64 = 5.5e-3;
 
@@ -49,7 +48,7 @@ pub struct Needle {
     pub entry_m: [f64; 3],
     /// Unit vector into the body.
     pub direction: [f64; 3],
-    /// Depth of the tip from the entry.
+    /// Depth of the deepest seed's middle from the entry; the tip goes half a seed deeper.
     pub depth_m: f64,
     /// Distance from the entry to which the tip is drawn back after the last drop; 0: to the entry.
     pub retract_to_m: f64,

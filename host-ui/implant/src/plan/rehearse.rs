@@ -1,6 +1,6 @@
 //! Rehearsal of one needle: the operator's actions, and the predicted places of the seeds.
 
-use super::Needle;
+use super::{Needle, SEED_LENGTH_M};
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
@@ -21,7 +21,8 @@ pub struct Drops {
     pub entry_m: [f64; 3],
     /// Unit vector into the body.
     pub direction: [f64; 3],
-    /// Distance of the tip from the entry when each seed leaves it, deepest first.
+    /// Distance from the entry at which the needle leaves the middle of each seed, deepest first; its tip is half a seed
+    /// deeper.
     pub along_m: Vec<f64>,
     /// Distance from the entry to which the tip is drawn back after the last drop, m.
     pub retract_to_m: f64,
@@ -47,7 +48,7 @@ impl Drops {
         [0, 1, 2].map(|a| self.entry_m[a] + self.direction[a] * along_m)
     }
 
-    /// Returns the places of the tip when the seeds leave it, m, in the order of the drops.
+    /// Returns the places at which the needle leaves the middles of the seeds, m, in the order of the drops.
     pub fn drops_m(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         self.along_m.iter().map(|&along| self.at_m(along))
     }
@@ -57,7 +58,7 @@ impl Drops {
         StabilisingNeedle {
             entry_m: self.entry_m,
             direction: self.direction,
-            depth_m: self.along_m.iter().copied().fold(0.0, f64::max),
+            depth_m: self.along_m.iter().copied().fold(0.0, f64::max) + 0.5 * SEED_LENGTH_M,
         }
     }
 
@@ -66,7 +67,11 @@ impl Drops {
         NeedleWay {
             entry_m: self.entry_m.into(),
             direction: self.direction.into(),
-            drops_m: self.drops_m().map(Into::into).collect(),
+            drops_m: self
+                .along_m
+                .iter()
+                .map(|along_m| self.at_m(along_m + 0.5 * SEED_LENGTH_M).into())
+                .collect(),
             retract_to_m: self.retract_to_m,
             strand_pitch_m: self.strand_pitch_m,
         }
@@ -106,7 +111,7 @@ impl Drops {
 pub struct Rest {
     /// Places of the seeds at rest, in the order of the drops.
     pub seeds_m: Vec<[f64; 3]>,
-    /// Place of the tip when it left each seed: the hand stops near its goal.
+    /// Middle of each seed when the needle left it: the hand stops near its goal.
     pub dropped_at_m: Vec<[f64; 3]>,
     /// Time of each drop after the tip's first contact with tissue.
     pub dropped_after_s: Vec<f64>,

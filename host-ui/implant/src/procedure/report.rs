@@ -87,8 +87,12 @@ fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
     let patient = scene.header.patient();
     let to_patient = |v| mm(patient.patient_from_scene(v));
     let in_tissue = &snapshot.header.seeds[..snapshot.header.seed_count as usize];
-    placed(planned, lost, in_tissue)
-        .map(|(drop, seed)| {
+    let pairs: Vec<(&PlannedDrop, &SeedPose)> = placed(planned, lost, in_tissue).collect();
+    let poses: Vec<SeedPose> = pairs.iter().map(|(_, seed)| **seed).collect();
+    pairs
+        .iter()
+        .enumerate()
+        .map(|(number, (drop, seed))| {
             let planned = drop.planned_m;
             let off = SeedOffset::of(planned, seed.position_m, drop.direction);
             json!({
@@ -99,6 +103,7 @@ fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
                 "placed_ras_mm": to_patient(seed.position_m),
                 "error_mm": off.distance_m() * 1e3, "error_along_mm": off.along_m * 1e3,
                 "error_across_mm": off.across_m * 1e3,
+                "touches_seeds": touching(&poses, number),
                 "rehearsed_mm": drop.rehearsed_m.map(mm),
                 "off_rehearsal_mm": drop.rehearsed_m.map(|m| distance_m(m, seed.position_m) * 1e3),
             })
@@ -327,15 +332,16 @@ fn motion_line(needles: &Value) {
 }
 
 fn table(result: &Value) {
-    println!("seed  along the needle (mm)  across (mm)  total (mm)");
+    println!("seed  along the needle (mm)  across (mm)  total (mm)  touches seeds");
     for (index, seed) in result["seeds"].as_array().into_iter().flatten().enumerate() {
         let value = |key: &str| seed[key].as_f64().unwrap_or(f64::NAN);
         println!(
-            "{:4}  {:21.3}  {:11.3}  {:10.3}",
+            "{:4}  {:21.3}  {:11.3}  {:10.3}  {:>13}",
             index + 1,
             value("error_along_mm"),
             value("error_across_mm"),
-            value("error_mm")
+            value("error_mm"),
+            seed["touches_seeds"].to_string().trim_matches(['[', ']'])
         );
     }
     motion_line(&result["plan"]["needles"]);

@@ -19,7 +19,7 @@ use stylet_dose::report::{Judge, Verdict};
 use stylet_dose::{DoseError, DoseKernel, Seed};
 use stylet_host::moments::Moment;
 use stylet_report::picture::DrawError;
-use stylet_shm_schema::{SeedPose, TickRecord};
+use stylet_shm_schema::{SeedPose, TickRecord, touching};
 pub use trace::Trace;
 pub use write::{to_json, write};
 
@@ -128,6 +128,17 @@ pub struct Score<'a> {
 }
 
 impl<'a> Score<'a> {
+    /// Returns the numbers, from 1, of the seeds that each one touches, in the order of the pairs.
+    pub fn touching(&self) -> Vec<Vec<usize>> {
+        let pose = |pair: &SeedPair| SeedPose {
+            position_m: pair.delivered.position_m,
+            axis: pair.delivered.axis.unwrap_or_default(),
+            dropped_at_m: pair.planned.position_m,
+        };
+        let poses: Vec<SeedPose> = self.implant.pairs.iter().map(pose).collect();
+        (0..poses.len()).map(|number| touching(&poses, number)).collect()
+    }
+
     /// Scores an implant; returns an error if there is no seed, or the dose cannot be computed.
     pub fn of(implant: Implant<'a>) -> Result<Self, ScoreError> {
         if implant.pairs.is_empty() {

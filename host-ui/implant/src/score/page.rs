@@ -186,13 +186,15 @@ fn seeds(score: &Score) -> Markup {
         "error, mm",
         "along, mm",
         "across, mm",
+        "touches seeds",
         "D90 lost, Gy",
         "V100 lost, %",
     ];
     if has_urethra {
         head.extend(["urethra D10 saved, Gy", "urethra D30 saved, Gy"]);
     }
-    let rows: Vec<_> = order.iter().take(ROWS).map(|&n| seed(score, n)).collect();
+    let touching = score.touching();
+    let rows: Vec<_> = order.iter().take(ROWS).map(|&n| seed(score, n, &touching[n])).collect();
     html! {
         (parts::numbers(&head, &rows))
         @if order.len() > ROWS {
@@ -201,7 +203,8 @@ fn seeds(score: &Score) -> Markup {
     }
 }
 
-fn seed(score: &Score, n: usize) -> Vec<Markup> {
+fn seed(score: &Score, n: usize, touching: &[usize]) -> Vec<Markup> {
+    let touching: Vec<String> = touching.iter().map(ToString::to_string).collect();
     let (pair, cost) = (&score.implant.pairs[n], &score.costs[n]);
     let off = pair.offset();
     let hole = pair.hole.map_or_else(|| "–".to_owned(), |h| h.to_string());
@@ -215,6 +218,7 @@ fn seed(score: &Score, n: usize) -> Vec<Markup> {
         cell(format!("{:.2}", off.distance_m() * 1e3)),
         cell(format::signed_mm(off.along_m)),
         cell(format!("{:.2}", off.across_m * 1e3)),
+        cell(touching.join(", ")),
         html! { @if is_costly { span class="bad" { (lost_gy) } } @else { (lost_gy) } },
         cell(format::decimal(cost.target_v100_percent, 3)),
     ];

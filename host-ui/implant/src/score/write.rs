@@ -11,14 +11,14 @@ pub fn to_json(score: &Score) -> Value {
     let frames = i.anatomy.patient;
     let ras_mm = |p: [f64; 3]| frames.patient_from_scene(p).map(|c| c * 1e3);
     let [mean, worst] = score.errors_m();
-    let seed = |(pair, cost): (&super::SeedPair, &super::Cost)| {
+    let seed = |((pair, cost), touching): ((&super::SeedPair, &super::Cost), Vec<usize>)| {
         let off = pair.offset();
         json!({
             "needle": pair.needle + 1, "hole": pair.hole.map(|h| h.to_string()), "strength_u": pair.planned.strength_u,
             "planned_ras_mm": ras_mm(pair.planned.position_m), "delivered_ras_mm": ras_mm(pair.delivered.position_m),
             "axis_ras": pair.delivered.axis.map(|a| frames.patient_from_scene_direction(a)),
             "error_mm": off.distance_m() * 1e3, "error_along_mm": off.along_m * 1e3,
-            "error_across_mm": off.across_m * 1e3,
+            "error_across_mm": off.across_m * 1e3, "touches_seeds": touching,
             "cost": {
                 "target_d90_gy": cost.target_d90_gy, "target_v100_percent": cost.target_v100_percent,
                 "urethra_d10_gy": cost.urethra_d10_gy, "urethra_d30_gy": cost.urethra_d30_gy,
@@ -35,7 +35,7 @@ pub fn to_json(score: &Score) -> Value {
         "cost_is": "gain if this seed alone lay on plan: D90 and V100 lost, dose to the urethra saved",
         "moments": i.moments.iter().map(|m| json!({ "at_s": score.at_s(m), "kind": m.kind.name(), "text": m.text })).collect::<Vec<_>>(),
         "updates": i.updates.iter().map(updates::to_json).collect::<Vec<_>>(),
-        "seeds": i.pairs.iter().zip(&score.costs).map(seed).collect::<Vec<_>>(),
+        "seeds": i.pairs.iter().zip(&score.costs).zip(score.touching()).map(seed).collect::<Vec<_>>(),
         "motion": {
             "duration_s": m.duration_s, "in_tissue_s": m.in_tissue_s,
             "mean_insertion_mm_s": m.mean_insertion_m_per_s * 1e3, "peak_insertion_mm_s": m.peak_insertion_m_per_s * 1e3,

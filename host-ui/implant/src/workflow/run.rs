@@ -65,14 +65,11 @@ pub struct Placed {
 }
 
 impl Placed {
-    /// Finds placed seeds by the tip's place when they left it, and its present place; `lost` are
+    /// Finds placed seeds by the places at which the needle left them, and the tip's present place; `lost` are
     /// the numbers of drops known to have left no seed.
     pub fn find(tasks: &[NeedleTask], dropped_at_m: &[[f64; 3]], tip_m: Option<[f64; 3]>, lost: &[usize]) -> Self {
         let ways: Vec<NeedleWay> = tasks.iter().map(|task| task.drops.way()).collect();
-        let drops_m: Vec<[f64; 3]> = ways
-            .iter()
-            .flat_map(|way| way.drops_m.iter().map(|&d| d.into()))
-            .collect();
+        let drops_m: Vec<[f64; 3]> = tasks.iter().flat_map(|task| task.drops.drops_m()).collect();
         let made = pairing::made(&drops_m, dropped_at_m);
         let mut from = 0;
         let mut count = |way: &NeedleWay| {

@@ -6,7 +6,10 @@ use crate::shown::Shown;
 use bytemuck::Zeroable;
 use stylet_implant::plan::Template;
 use stylet_implant::workflow::default_plan;
-use stylet_shm_schema::{Fault, Text, TickRecord, flags};
+use stylet_shm_schema::{Fault, SEED_LENGTH_M, Text, TickRecord, flags};
+
+/// Depth of the tip that leaves the first seed of `one_needle` on plan.
+const FIRST_DROP_M: f64 = 0.07 + 0.5 * SEED_LENGTH_M;
 
 fn what(shown: &Shown, membranes: &MetMembranes) -> String {
     lesson(shown, membranes).what
@@ -20,8 +23,8 @@ fn the_guide_follows_the_state_machine() {
         (live(), "Plan five seeds"),
         (one_needle(-0.05, 0), "Bring the tip to the entry"),
         (one_needle(0.03, 0), "Push the needle in"),
-        (one_needle(0.07, 0), "Press Space"),
-        (one_needle(0.07, 1), "Draw the needle back by 10.0 mm"),
+        (one_needle(FIRST_DROP_M, 0), "Press Space"),
+        (one_needle(FIRST_DROP_M, 1), "Draw the needle back by 10.0 mm"),
         (one_needle(0.03, 5), "Take the needle out"),
     ] {
         let mut shown = shown;

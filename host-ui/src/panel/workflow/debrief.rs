@@ -9,6 +9,7 @@ use crate::words::Explained;
 use egui::RichText;
 use egui_plot::{Line, PlotPoints, VLine};
 use stylet_base::format;
+use stylet_shm_schema::touching;
 
 /// Height of the visible rows of the seed table; the others scroll.
 const TABLE_HEIGHT: f32 = 150.0;
@@ -146,6 +147,11 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
             ui.label(theme::small(text));
         }
     });
+    let touch = |number: &usize| !touching(&shown.seeds, *number).is_empty();
+    let touching = (0..shown.seeds.len()).filter(touch).count();
+    if touching > 0 {
+        ui.label(theme::small(format!("{touching} seeds touch another one")));
+    }
     egui::ScrollArea::vertical()
         .id_salt("seed errors")
         .max_height(TABLE_HEIGHT)

@@ -205,6 +205,7 @@ mod tests {
     use super::*;
     use bytemuck::Zeroable;
     use stylet_host::link::LinkStatus;
+    use stylet_implant::plan::SEED_LENGTH_M;
     use stylet_shm_schema::{HapticState, PlanInForce, SceneHeader, SeedPose, flags};
 
     /// Returns a state with seeds at 30 and 20 mm along z, and the tip at a depth.
@@ -235,13 +236,15 @@ mod tests {
     #[test]
     fn the_procedure_goes_through_its_steps_one_thing_at_a_time() {
         let drop = Action::DropSeed;
+        // The tip is half a seed deeper than the middle of a seed that leaves it.
+        let [first, second] = [0.03, 0.02].map(|seed_m| seed_m + 0.5 * SEED_LENGTH_M);
         let way: [(f64, &[f64], Progress, Option<Action>); 7] = [
             (-0.05, &[], Progress::Place, Some(Action::PlaceNeedle)),
             (0.0, &[], Progress::Insert, Some(Action::Insert)),
-            (0.03, &[], Progress::Drop, Some(drop.clone())),
-            (0.03, &[0.03], Progress::Drop, Some(Action::MoveTo(0.02))),
-            (0.02, &[0.03], Progress::Drop, Some(drop)),
-            (0.02, &[0.03, 0.02], Progress::Retract, Some(Action::Retract)),
+            (first, &[], Progress::Drop, Some(drop.clone())),
+            (first, &[0.03], Progress::Drop, Some(Action::MoveTo(second))),
+            (second, &[0.03], Progress::Drop, Some(drop)),
+            (second, &[0.03, 0.02], Progress::Retract, Some(Action::Retract)),
             (0.0, &[0.03, 0.02], Progress::Debrief, None),
         ];
         for (depth_m, dropped, step, action) in way {

@@ -22,7 +22,7 @@ pub(super) struct Rehearsals<'a> {
 /// Place of a seed when it was left, and at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SeedAtRest {
-    /// Place of the tip, from the entry along the needle, m.
+    /// Place at which the needle left its middle, from the entry along the needle, m.
     pub tip_m: f64,
     /// Place at rest, m.
     pub rest_m: Vector3<f64>,
