@@ -115,7 +115,7 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use stylet_settings::{
     BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_LEFT_NEEDLES, MAX_NODES, MAX_STRUCTURES, PARAMETER_COUNT,
     PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet, ParameterSpec,
-    ProblemList, SEED_LENGTH_M, SEED_RADIUS_M, folding,
+    ProblemList, SEED_LENGTH_M, SEED_RADIUS_M, TOUCHING_M, folding,
 };
 pub use text::Text;
 

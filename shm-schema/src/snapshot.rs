@@ -1,6 +1,6 @@
 //! The deformed gland, written by the tissue thread and copied to hosts by the bridge.
 
-use crate::{MAX_LEFT_NEEDLES, MAX_SEEDS, SEED_LENGTH_M, SEED_RADIUS_M, SceneId};
+use crate::{MAX_LEFT_NEEDLES, MAX_SEEDS, SEED_LENGTH_M, SEED_RADIUS_M, SceneId, TOUCHING_M};
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
@@ -15,8 +15,6 @@ pub struct Vertex {
 
 /// Cosine of the angle between two seeds of one track, at least.
 const PARALLEL: f64 = 0.9;
-/// Largest gap between two seeds that touch, m.
-const TOUCHING_M: f64 = 1e-4;
 
 /// Present pose of a seed.
 #[repr(C)]

@@ -3,13 +3,10 @@
 use crate::Tissue;
 use nalgebra::Vector3;
 use stylet_shm_schema::{GridInfo, SceneHeader};
+pub use stylet_shm_schema::{SEED_LENGTH_M, SEED_RADIUS_M};
 
 /// Radius of a needle, 18 G, m.
 pub const NEEDLE_RADIUS_M: f64 = 0.635e-3;
-/// Length of a seed over its welds, m.
-pub const SEED_LENGTH_M: f64 = 4.5e-3;
-/// Radius of a seed, m.
-pub const SEED_RADIUS_M: f64 = 0.4e-3;
 
 /// Body at rest.
 #[derive(Clone, Debug)]

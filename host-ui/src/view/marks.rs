@@ -7,8 +7,8 @@ use nalgebra::Vector3;
 
 type V = Vector3<f32>;
 
-pub const SEED_LENGTH_M: f32 = 4.5e-3;
-pub const SEED_RADIUS_M: f32 = 0.4e-3;
+const SEED_LENGTH_M: f32 = stylet_shm_schema::SEED_LENGTH_M as f32;
+const SEED_RADIUS_M: f32 = stylet_shm_schema::SEED_RADIUS_M as f32;
 /// Radius of an 18 gauge needle.
 const NEEDLE_RADIUS_M: f32 = 0.635e-3;
 /// Drawn length of the needle.

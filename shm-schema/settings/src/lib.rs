@@ -23,7 +23,7 @@ mod table;
 pub use problem::{ParameterProblem, ParameterProblems, folding};
 pub use problem_list::ProblemList;
 pub use scene::{BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_LEFT_NEEDLES, MAX_NODES, MAX_STRUCTURES};
-pub use seed::{SEED_LENGTH_M, SEED_RADIUS_M};
+pub use seed::{SEED_LENGTH_M, SEED_RADIUS_M, TOUCHING_M};
 pub use set::ParameterSet;
 pub use table::{PARAMETER_COUNT, PARAMETERS, ParameterId};
 

@@ -23,7 +23,7 @@ pub use anatomy::Anatomy;
 pub use compensate::{Compensation, Limits, compensate};
 pub use edit::{History, Row};
 pub use error::PlanError;
-pub use needle::{Loading, Needle, NeedleSeed, SEED_LENGTH_M, SPACER_M};
+pub use needle::{Loading, Needle, NeedleSeed, SEED_LENGTH_M, SPACER_M, TOUCHING_M};
 pub use problem::{FileProblem, SeedsProblem};
 pub use rehearse::{Drops, LinkRehearser, RehearsalError, Rehearser};
 use stylet_anatomy::PatientFrame;

@@ -3,7 +3,7 @@
 use super::template::Hole;
 use nalgebra::Vector3;
 use stylet_dose::Seed;
-pub use stylet_shm_schema::SEED_LENGTH_M;
+pub use stylet_shm_schema::{SEED_LENGTH_M, TOUCHING_M};
 
 /// Usual spacer between two seeds of a strand; seeds then lie 10 mm apart.
 pub const SPACER_M: f64 = 5.5e-3;
@@ -69,6 +69,11 @@ impl Needle {
         (Vector3::from(point_m) - Vector3::from(self.entry_m)).dot(&Vector3::from(self.direction))
     }
 
+    /// Returns the depth of the tip at the deepest drop.
+    pub fn tip_m(&self) -> f64 {
+        self.depth_m + 0.5 * SEED_LENGTH_M
+    }
+
     /// Returns the planned places of its seeds, deepest first.
     pub fn seeds_m(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         self.seeds.iter().map(|s| self.at_m(s.along_m))
@@ -83,8 +88,7 @@ impl Needle {
         })
     }
 
-    /// Sorts the seeds in the order of dropping, and sets the depth of the tip to that of the
-    /// deepest.
+    /// Sorts the seeds in the order of dropping, and sets the depth to that of the deepest.
     pub fn in_order(mut self) -> Self {
         self.seeds.sort_by(|a, b| b.along_m.total_cmp(&a.along_m));
         self.depth_m = self.seeds.first().map_or(self.depth_m, |s| s.along_m);

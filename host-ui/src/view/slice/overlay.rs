@@ -13,12 +13,13 @@ use egui::{Align, Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, V
 use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_base::format;
+use stylet_shm_schema::SEED_LENGTH_M;
 use stylet_surfaces::mesh::cut;
 
 /// Distance from the plane within which a point is in it.
 const IN_PLANE_M: f64 = 1.5e-3;
 /// Half a seed: distance beyond which the plane does not cut it.
-const SEED_HALF_M: f64 = 2.25e-3;
+const SEED_HALF_M: f64 = 0.5 * SEED_LENGTH_M;
 const NEEDLE_M: f64 = 0.12;
 /// Drawn and blank points of an isodose line; outlines of structures are solid and wider.
 const DASHES: [[f32; 2]; 4] = [[2.0, 3.0], [14.0, 2.0], [8.0, 3.0], [3.0, 2.0]];
