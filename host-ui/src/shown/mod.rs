@@ -267,13 +267,12 @@ impl Shown {
         Some((deepest + PAST_LAST_SEED_M).min(0.3))
     }
 
-    /// Returns the depth of the deepest planned seed.
+    /// Returns the depth of the tip when the deepest planned seed leaves it.
     pub fn deepest_seed_m(&self) -> Option<f64> {
         Some(self.path_length_m()? - PAST_LAST_SEED_M)
     }
 
-    /// Returns the depth of the deepest planned seed without a dropped one; `None` if there is
-    /// none.
+    /// Returns the depth of the tip when the deepest planned seed without a dropped one leaves it; `None` if there is none.
     pub fn next_seed_m(&self) -> Option<f64> {
         let plan = self.plan.as_ref()?;
         let rows = own_errors(self);

@@ -6,7 +6,9 @@ use nalgebra::Vector3;
 use stylet_shm_schema::MAX_SEEDS;
 
 /// Reach of a 20 cm needle's tip beyond the template's face.
-pub const REACH_M: f64 = 0.20;
+const REACH_M: f64 = 0.20;
+/// Depth of the deepest seed's middle at that reach.
+pub const DEEPEST_SEED_M: f64 = REACH_M - 0.5 * SEED_LENGTH_M;
 /// Smallest distance of a needle from spared structures.
 pub const SPARED_MARGIN_M: f64 = 1e-3;
 /// Distance outside the target up to which a seed is allowed: seeds at its edge are planned there.
@@ -95,19 +97,22 @@ fn way(found: &mut Found, needle: &Needle, anatomy: &Anatomy) {
     if needle.seeds.is_empty() {
         found.add("it has no seed; load or remove it");
     }
-    if needle.depth_m > REACH_M {
-        let (depth, reach) = (needle.depth_m * 1e3, REACH_M * 1e3);
-        found.add(&format!("it goes {depth:.1} mm deep; the needle reaches {reach:.0} mm"));
+    let tip_m = needle.tip_m();
+    if tip_m > REACH_M {
+        let (tip_mm, reach_mm) = (tip_m * 1e3, REACH_M * 1e3);
+        found.add(&format!(
+            "its tip goes {tip_mm:.1} mm deep; the needle reaches {reach_mm:.0} mm"
+        ));
     }
     if !(needle.depth_m >= 0.0 && (0.0..=needle.depth_m).contains(&needle.retract_to_m)) {
         found.add("its depth is negative, or it is drawn back to a place that is not between entry and depth");
         return;
     }
-    let depth_m = needle.depth_m.min(REACH_M);
-    if let Some(body) = anatomy.spared_in_the_way(needle.entry_m, needle.direction, depth_m, SPARED_MARGIN_M) {
+    let tip_m = tip_m.min(REACH_M);
+    if let Some(body) = anatomy.spared_in_the_way(needle.entry_m, needle.direction, tip_m, SPARED_MARGIN_M) {
         found.add(&format!("it goes through {}, which is to be spared", body.name));
     }
-    let piece = |body: &&Body| !body.pieces_m(needle.entry_m, needle.direction, depth_m).is_empty();
+    let piece = |body: &&Body| !body.pieces_m(needle.entry_m, needle.direction, tip_m).is_empty();
     if let Some(bone) = anatomy.bone.iter().find(piece) {
         found.add(&format!(
             "it goes through {}, which is bone; choose another hole",

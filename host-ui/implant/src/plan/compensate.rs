@@ -43,7 +43,7 @@ impl Default for Limits {
         Self {
             along_m: 15e-3,
             across_m: 1.5e-3,
-            reach_m: super::check::REACH_M - 0.5 * super::SEED_LENGTH_M,
+            reach_m: super::check::DEEPEST_SEED_M,
             rehearsals: 30,
             enough_m: 0.1e-3,
         }

@@ -97,6 +97,9 @@ fn each_fault_is_reported_once_and_all_together() {
     let mut deep = good();
     deep.needles[1].depth_m = 0.25;
     one(deep, "reaches 200 mm");
+    let mut tip_alone = good();
+    tip_alone.needles[1].depth_m = 0.19855;
+    one(tip_alone, "its tip goes 200.8 mm deep");
     let mut twice = good();
     twice.needles[1].hole = Some(hole("E7"));
     one(twice, "the hole of needle 1");
@@ -107,6 +110,31 @@ fn each_fault_is_reported_once_and_all_together() {
     let mut wrong = good().with_strength(f64::NAN);
     wrong.needles[0].direction = [0.0; 3];
     assert!(problems(&wrong, &anatomy).len() >= 4);
+}
+
+/// The way used to be checked to the middle of the deepest seed, while the tip goes half a seed deeper.
+#[test]
+fn what_only_the_tip_reaches_is_in_the_way() {
+    let ahead = || vec![ball("bladder", [0.06, 0.05, 0.0815], [0.005, 0.005, 0.01])];
+    let what = |anatomy: Anatomy| {
+        problems(&good(), &anatomy)
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+    };
+    let spared = what(Anatomy {
+        spared: ahead(),
+        ..anatomy()
+    });
+    assert_eq!(spared, ["needle 1: it goes through bladder, which is to be spared"]);
+    let bone = what(Anatomy {
+        bone: ahead(),
+        ..anatomy()
+    });
+    assert!(
+        bone.len() == 1 && bone[0].contains("bladder, which is bone"),
+        "{bone:?}"
+    );
 }
 
 #[test]

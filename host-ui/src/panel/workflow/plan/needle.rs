@@ -10,7 +10,7 @@ use crate::theme::Press;
 use crate::words::Explained;
 use egui::{Button, DragValue};
 use stylet_base::format;
-use stylet_implant::plan::check::{REACH_M, STRENGTHS_U};
+use stylet_implant::plan::check::{DEEPEST_SEED_M, STRENGTHS_U};
 use stylet_implant::plan::{Row, SEED_LENGTH_M};
 
 const MOST_SEEDS: usize = 15;
@@ -111,7 +111,11 @@ fn row_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, actions: &mut Vec
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         let mut deepest_mm = format::mm(row.deepest_m);
-        labelled(ui, "Depth", millimetres(&mut deepest_mm, 0.0..=format::mm(REACH_M)));
+        labelled(
+            ui,
+            "Depth",
+            millimetres(&mut deepest_mm, 0.0..=format::mm(DEEPEST_SEED_M)),
+        );
         if (deepest_mm - format::mm(was.deepest_m)).abs() > 0.04 {
             row.deepest_m = format::metres(deepest_mm);
         }
