@@ -45,7 +45,7 @@ impl Theatre {
 }
 
 impl Rehearser for Theatre {
-    fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {
+    fn rehearse(&mut self, drops: &Drops, pace: &Pace, as_points: bool) -> Result<Rest, RehearsalError> {
         self.rehearsals += 1;
         let run = NeedleRehearsal {
             entry_m: drops.entry_m,
@@ -58,6 +58,7 @@ impl Rehearser for Theatre {
             strand_pitch_m: drops.strand_pitch_m,
             stabilising: Vec::new(),
             earlier: Vec::new(),
+            as_points,
             drops_m: drops.drops_m().collect(),
         };
         let done = self

@@ -114,6 +114,7 @@ fn run(needle: &Needle, drawn: &Drawn) -> NeedleRehearsal {
         strand_pitch_m: needle.strand_pitch_mm.map(|pitch| pitch * 1e-3),
         stabilising: Vec::new(),
         earlier: Vec::new(),
+        as_points: false,
         drops_m: needle
             .seeds
             .iter()

@@ -174,6 +174,8 @@ pub struct NeedleRehearsal {
     /// Needles that came and went before, to their depths and in order, at most [`crate::MAX_EARLIER_NEEDLES`]: each
     /// shifts the needles that stay, and the tissue that they hold, a little. Unused without needles that stay.
     pub earlier: Vec<StabilisingNeedle>,
+    /// Seeds take no room: drops that look for edges lie nearer to each other than a seed is long.
+    pub as_points: bool,
     /// Middle of each seed where the needle leaves it, m, in the order of the drops: 1 to [`crate::MAX_SEEDS`].
     pub drops_m: Vec<[f64; 3]>,
 }

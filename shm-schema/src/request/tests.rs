@@ -30,6 +30,7 @@ fn rehearsal(drops: usize) -> NeedleRehearsal {
         strand_pitch_m: (drops > 1).then_some(0.01),
         stabilising: Vec::new(),
         earlier: Vec::new(),
+        as_points: drops > 2,
         drops_m: needle(drops).seeds_m,
     }
 }

@@ -90,6 +90,7 @@ mod tests {
             strand_pitch_m: None,
             stabilising: Vec::new(),
             earlier: Vec::new(),
+            as_points: false,
             drops_m: vec![middle_m.into()],
         };
         let mut stage = Stage::build(&source, tissue, DeviceInfo::phantom_premium_1_5()).expect("built in");

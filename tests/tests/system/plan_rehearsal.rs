@@ -63,7 +63,9 @@ fn rehearsed(link: &mut Link, task: &NeedleTask) -> Rest {
         stabilising: &[],
         earlier: &[],
     };
-    rehearser.rehearse(&task.drops, &Pace::default()).expect("goes through")
+    rehearser
+        .rehearse(&task.drops, &Pace::default(), false)
+        .expect("goes through")
 }
 
 /// Rehearses and executes the host's default needle.

@@ -101,6 +101,7 @@ impl Drops {
             strand_pitch_m: self.strand_pitch_m,
             stabilising: stabilising.to_vec(),
             earlier: earlier[first..].to_vec(),
+            as_points: false,
             drops_m: self.drops_m().collect(),
         }
     }
@@ -151,8 +152,8 @@ pub enum RehearsalError {
 
 /// Simulator of a needle ahead of time.
 pub trait Rehearser {
-    /// Returns the predicted places of the seeds of these drops.
-    fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError>;
+    /// Returns the predicted places of the seeds of these drops, which take no room if they are `as_points`.
+    fn rehearse(&mut self, drops: &Drops, pace: &Pace, as_points: bool) -> Result<Rest, RehearsalError>;
 }
 
 /// Rehearser on the running core, with the parameters in force.
@@ -168,10 +169,13 @@ pub struct LinkRehearser<'a> {
 }
 
 impl Rehearser for LinkRehearser<'_> {
-    fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {
+    fn rehearse(&mut self, drops: &Drops, pace: &Pace, as_points: bool) -> Result<Rest, RehearsalError> {
         let link = &mut *self.link;
         let scene = link.scene().map(|s| s.header.id());
-        let request = Request::Rehearse(drops.rehearsal(pace, self.stabilising, self.earlier));
+        let request = Request::Rehearse(NeedleRehearsal {
+            as_points,
+            ..drops.rehearsal(pace, self.stabilising, self.earlier)
+        });
         let id = link.send(&request)?;
         let begun = Instant::now();
         while begun.elapsed() < LONGEST {

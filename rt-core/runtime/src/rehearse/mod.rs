@@ -252,6 +252,7 @@ impl Stage {
         world.tissue.return_to_rest();
         world.set_limits(active.limits.clone());
         world.migration = active.migration;
+        world.seeds_take_room = !run.as_points;
         Ok(Rig::new(world, active, (&self.device, self.hand), run))
     }
 }

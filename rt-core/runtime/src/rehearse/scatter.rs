@@ -85,6 +85,7 @@ mod tests {
             strand_pitch_m: None,
             stabilising: Vec::new(),
             earlier: Vec::new(),
+            as_points: false,
             drops_m: vec![[x_m, 0.02, 0.08]],
         }
     }

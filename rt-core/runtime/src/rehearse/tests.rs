@@ -45,6 +45,7 @@ fn needle() -> NeedleRehearsal {
         strand_pitch_m: None,
         stabilising: Vec::new(),
         earlier: Vec::new(),
+        as_points: false,
         drops_m: [0.8, 0.5, 0.2].map(at).to_vec(),
     }
 }

@@ -24,6 +24,8 @@ pub struct World {
     pub limits: Limits,
     /// Migration of dropped seeds; off in a new world.
     pub migration: Migration,
+    /// Seeds take room in their track.
+    pub seeds_take_room: bool,
     /// Detects and corrects folds near the tip. Seeds and forces are the same without it, and the tissue loop is
     /// faster.
     pub looks_near_tip: bool,
@@ -49,6 +51,7 @@ impl World {
             scene,
             limits,
             migration: Migration::default(),
+            seeds_take_room: true,
             looks_near_tip: true,
             shown: None,
         })

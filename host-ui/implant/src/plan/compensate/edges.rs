@@ -189,7 +189,7 @@ fn stops(drops: &Drops, steps: &[i8]) -> Vec<Stop> {
 }
 
 /// Rehearses with a loose seed at every drop and at every stop around it, by these numbers of steps
-/// shallower and deeper.
+/// shallower and deeper. They are nearer to each other than a seed is long, so they take no room.
 fn at_stops(
     rehearsals: &mut Rehearsals,
     at: &RehearsedDrops,
@@ -204,7 +204,7 @@ fn at_stops(
         strand_pitch_m: None,
         ..at.drops.clone()
     };
-    let left = rehearsals.left(&drops)?;
+    let left = rehearsals.left(&drops, true)?;
     let of = |seed: usize| {
         stops
             .iter()

@@ -30,7 +30,7 @@ pub(super) struct SeedAtRest {
 
 impl Rehearsals<'_> {
     pub fn try_it(&mut self, drops: Drops) -> Result<RehearsedDrops, RehearsalError> {
-        let left = self.left(&drops)?;
+        let left = self.left(&drops, false)?;
         let off = |(left, planned): (&SeedAtRest, [f64; 3])| left.rest_m - Vector3::from(planned);
         Ok(RehearsedDrops {
             error_m: left.iter().zip(self.needle.seeds_m()).map(off).collect(),
@@ -39,12 +39,12 @@ impl Rehearsals<'_> {
         })
     }
 
-    /// Returns the places of the seeds, in the order of the drops.
-    pub fn left(&mut self, drops: &Drops) -> Result<Vec<SeedAtRest>, RehearsalError> {
+    /// Returns the places of the seeds, in the order of the drops; they take no room if they are `as_points`.
+    pub fn left(&mut self, drops: &Drops, as_points: bool) -> Result<Vec<SeedAtRest>, RehearsalError> {
         self.count += 1;
         let Rest {
             seeds_m, dropped_at_m, ..
-        } = self.rehearser.rehearse(drops, self.pace)?;
+        } = self.rehearser.rehearse(drops, self.pace, as_points)?;
         let (entry_m, direction) = (Vector3::from(drops.entry_m), Vector3::from(drops.direction));
         let each = seeds_m.into_iter().zip(dropped_at_m);
         Ok(each

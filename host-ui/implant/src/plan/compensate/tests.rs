@@ -1,11 +1,11 @@
 //! Compensation in tissues of known motion, whose result is known without a rehearsal.
 
 use super::*;
-use crate::plan::NeedleSeed;
 use crate::plan::rehearse::Rest;
+use crate::plan::{NeedleSeed, SEED_LENGTH_M};
 
 /// Tissue that lies ahead by a law of the drop's place along the needle, and seeds that are off
-/// across.
+/// across. A seed rests behind the last one.
 struct Known<F> {
     ahead_m: F,
     across_m: [f64; 3],
@@ -18,7 +18,7 @@ struct Known<F> {
 }
 
 impl<F: Fn(f64) -> f64> Rehearser for Known<F> {
-    fn rehearse(&mut self, drops: &Drops, _: &Pace) -> Result<Rest, RehearsalError> {
+    fn rehearse(&mut self, drops: &Drops, _: &Pace, as_points: bool) -> Result<Rest, RehearsalError> {
         self.asked += 1;
         let is_outside = |&z: &f64| z > self.tissue_to_m || z < self.tissue_from_m;
         if let Some(drop) = drops.along_m.iter().position(is_outside) {
@@ -31,8 +31,13 @@ impl<F: Fn(f64) -> f64> Rehearser for Known<F> {
             0.0 => z,
             by_m => (z / by_m).round() * by_m,
         };
+        let mut last_m = f64::INFINITY;
         let rest = |z: f64| {
-            let p = drops.at_m(z - (self.ahead_m)(z));
+            last_m = match as_points {
+                true => z - (self.ahead_m)(z),
+                false => (z - (self.ahead_m)(z)).min(last_m - SEED_LENGTH_M),
+            };
+            let p = drops.at_m(last_m);
             [0, 1, 2].map(|a| p[a] + self.across_m[a])
         };
         Ok(Rest {
@@ -265,10 +270,10 @@ fn a_drop_beyond_the_tissue_is_shifted_into_it() {
 fn an_ended_core_is_not_taken_for_an_edge() {
     struct Closed(usize);
     impl Rehearser for Closed {
-        fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {
+        fn rehearse(&mut self, drops: &Drops, pace: &Pace, as_points: bool) -> Result<Rest, RehearsalError> {
             self.0 += 1;
             match self.0 {
-                1 => tissue(|_| 0.0).rehearse(drops, pace),
+                1 => tissue(|_| 0.0).rehearse(drops, pace, as_points),
                 _ => Err(RehearsalError::Interrupted),
             }
         }
@@ -310,7 +315,7 @@ fn a_sticking_hand_is_moved_until_its_tip_is_clear() {
 fn a_refused_last_drop_does_not_stop_a_deeper_search() {
     struct Dragged;
     impl Rehearser for Dragged {
-        fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {
+        fn rehearse(&mut self, drops: &Drops, pace: &Pace, as_points: bool) -> Result<Rest, RehearsalError> {
             let mut known = tissue(|z| 0.2 * z);
             let begins_m = 0.034 + 0.5 * (drops.along_m[0] - 0.055);
             if drops.along_m[2] < begins_m {
@@ -319,7 +324,7 @@ fn a_refused_last_drop_does_not_stop_a_deeper_search() {
                     drop: Some(2),
                 });
             }
-            known.rehearse(drops, pace)
+            known.rehearse(drops, pace, as_points)
         }
     }
     let done = run(&needle(Loading::Loose), &mut Dragged);

@@ -74,6 +74,33 @@ fn no_two_seeds_of_a_needle_rest_nearer_than_touching() {
     assert!(touching > 0);
 }
 
+/// Compensation drops seeds 0.15 mm apart to find edges. Seeds with a body lay in a column, so every drop seemed to be on
+/// an edge.
+#[test]
+fn points_lie_nearer_to_each_other_than_seeds() {
+    let (mut stage, stop) = (stage(), AtomicBool::new(false));
+    stage.seeds_and_forces_alone();
+    let usual = default_procedure();
+    let [first, second] = [0, 2].map(|n| usual.drops_m[n]);
+    let [x, y, z] = second;
+    let mut apart_m = |as_points: bool| {
+        let run = NeedleRehearsal {
+            as_points,
+            drops_m: vec![first, second, [x, y, z - 0.15e-3]],
+            ..usual.clone()
+        };
+        let rehearsed = stage.rehearse(&run, &ParameterSet::default(), &stop);
+        let seeds = rehearsed.expect("goes through").seeds;
+        seeds[1].position_m[2] - seeds[2].position_m[2]
+    };
+    let [points_m, seeds_m] = [true, false].map(&mut apart_m);
+    println!("{points_m} and {seeds_m} m apart");
+    assert!(
+        (0.0..0.5e-3).contains(&points_m) && seeds_m > 4.4e-3,
+        "{points_m} {seeds_m}"
+    );
+}
+
 /// Prints the table of `docs/physics/seeds.md`: `cargo test --profile quick -p stylet-runtime --lib
 /// seeds_by_each_number -- --ignored --nocapture`
 #[test]

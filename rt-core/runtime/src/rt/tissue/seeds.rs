@@ -19,8 +19,8 @@ impl TissueLoop {
         let has_room = self.seeds.len() < MAX_SEEDS;
         let strand_pitch_m = strand_pitch_m.filter(|pitch_m| self.is_behind_the_last(*pitch_m));
         let on_line = self.line_in_tissue().map(|line| match strand_pitch_m {
-            None if has_room => (line, self.join_column(&line)),
-            // Spacers keep it from the others.
+            None if has_room && self.world.seeds_take_room => (line, self.join_column(&line)),
+            // Spacers keep it from the others, or it is a point.
             _ => (line, self.state.loads.tip_material_m),
         });
         let found = match on_line {
@@ -84,21 +84,19 @@ impl TissueLoop {
         front_m
     }
 
-    /// Moves a seed in the tissue at rest; returns false, and leaves it, where the body ends.
-    pub(super) fn shift_seed(&mut self, number: usize, by_m: [f64; 3]) -> bool {
+    /// Moves a seed in the tissue at rest; leaves it where the body ends.
+    pub(super) fn shift_seed(&mut self, number: usize, by_m: [f64; 3]) {
         let body = &self.world.scene.body;
         let Some(seed) = self.seeds.get_mut(number) else {
-            return false;
+            return;
         };
         let moved = |point: &MaterialPoint| {
             let place_m = point.rest_m(body);
             MaterialPoint::at_rest(body, [0, 1, 2].map(|a| place_m[a] + by_m[a]))
         };
-        match (moved(&seed.tip), seed.tail.as_ref().map(moved)) {
-            (Some(tip), tail) => (seed.tip, seed.tail) = (tip, tail.flatten()),
-            (None, _) => return false,
+        if let Some(tip) = moved(&seed.tip) {
+            (seed.tip, seed.tail) = (tip, seed.tail.as_ref().and_then(moved));
         }
-        true
     }
 
     /// Displacement of the needle's tip from a rigid one's.
