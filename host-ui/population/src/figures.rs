@@ -1,7 +1,9 @@
 //! Distributions of the results of insertions, and influences on their misplacement.
 
 use crate::dose::{Covered, Scored};
-use stylet_insertions::{Insertion, Motion, Table};
+use nalgebra::Vector3;
+use stylet_implant::plan::{SEED_LENGTH_M, TOUCHING_M};
+use stylet_insertions::{Insertion, Motion, Seed, Table};
 
 /// Sorted values of one quantity.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,6 +53,24 @@ impl Distribution {
     }
 }
 
+/// Name of the distribution of the room between neighbours.
+pub const GAP: &str = "Gap between neighbours on a needle";
+
+/// Returns the room between the ends of neighbours of one needle at rest, mm.
+fn gaps_mm(table: &Table) -> Vec<f64> {
+    let pairs = table.rows.iter().flat_map(|row| row.seeds.windows(2));
+    let gap_mm = |pair: &[Seed]| {
+        let [one, next] = [pair[0].rest?, pair[1].rest?].map(|rest| Vector3::from(rest.at_mm));
+        Some((one - next).norm() - 1e3 * SEED_LENGTH_M)
+    };
+    pairs.filter_map(gap_mm).collect()
+}
+
+/// Returns how many pairs of neighbours touch.
+pub fn touching(gaps_mm: &[f64]) -> usize {
+    gaps_mm.iter().filter(|gap_mm| **gap_mm < 1e3 * TOUCHING_M).count()
+}
+
 /// Returns all distributions, in the order of the page.
 pub fn figures(table: &Table, scored: &Scored) -> Vec<Distribution> {
     let seeds = |n: usize| {
@@ -70,6 +90,7 @@ pub fn figures(table: &Table, scored: &Scored) -> Vec<Distribution> {
     let all = [
         Distribution::new("Seed misplacement", "mm", "seed", seeds(0)),
         Distribution::new("Along the needle, + too deep", "mm", "seed", seeds(1)),
+        Distribution::new(GAP, "mm", "pair", gaps_mm(table)),
         Distribution::new("Shift of the gland", "mm", "insertion", motions(|m| m.target_shift_mm)),
         Distribution::new(largest, "mm", "insertion", motions(|m| m.largest_displacement_mm)),
         Distribution::new("Peak force on the hand", "N", "insertion", motions(|m| m.peak_force_n)),

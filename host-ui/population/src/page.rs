@@ -2,7 +2,7 @@
 
 use crate::dose::{Covered, ImplantDose, Scored};
 use crate::error::PopulationError;
-use crate::figures::{Distribution, influences};
+use crate::figures::{Distribution, GAP, influences, touching};
 use crate::picture;
 use crate::published::{PUBLISHED, Published, published_in};
 use crate::shards::Population;
@@ -44,6 +44,7 @@ pub fn page(p: &Population, scored: &Scored, figures: &[Distribution]) -> Result
             span { i class="line" style="border-top:2px dashed #d55e00" {} "published, numbered as in the caption" }
         }
         div class="plots" { @for plot in &plots { (plot) } }
+        @if let Some(gaps) = figures.iter().find(|d| d.name == GAP) { (neighbours(&gaps.values)) }
         (dose(scored))
         (what_goes_with_it(p))
         (published_table())
@@ -139,6 +140,17 @@ fn plot(d: &Distribution) -> Result<Markup, PopulationError> {
             }
         }
     })
+}
+
+fn neighbours(gaps_mm: &[f64]) -> Markup {
+    let (touch, of) = (touching(gaps_mm), gaps_mm.len());
+    html! {
+        p {
+            "Of " (thousands(of)) " pairs of neighbours on a needle " (thousands(touch)) " touch, "
+            b { (value(Some(100.0 * touch as f64 / of as f64))) " %" }
+            ". The nearest two are " (format!("{:.3}", gaps_mm[0])) " mm from end to end."
+        }
+    }
 }
 
 fn dose(scored: &Scored) -> Markup {

@@ -89,6 +89,25 @@ fn figures_are_those_of_the_closed_form() {
     assert_eq!(Distribution::new("n", "", "seed", Vec::new()).percentile(50.0), None);
 }
 
+/// Two seeds planned 10 mm apart: one insertion leaves them so, in the other one the second rests behind the first.
+#[test]
+fn neighbours_without_a_gap_touch() {
+    let mut rows = vec![row(1, 1, 0.0), row(1, 2, 0.0)];
+    let first_mm = rows[1].seeds[0].rest.unwrap().at_mm;
+    rows[1].seeds[1].rest.as_mut().unwrap().at_mm = [first_mm[0], first_mm[1], first_mm[2] + 4.55];
+    let gaps = figures(&table(rows), &Scored::default());
+    let gaps = &gaps
+        .iter()
+        .find(|d| d.name == figures::GAP)
+        .expect("there are pairs")
+        .values;
+    assert!(
+        (gaps[0] - 0.05).abs() < 1e-9 && (gaps[1] - 5.5).abs() < 1e-9,
+        "{gaps:?}"
+    );
+    assert_eq!(figures::touching(gaps), 1);
+}
+
 #[test]
 fn a_monotone_influence_has_rank_correlation_one() {
     let rows = (1..=8).map(|n| row(n, 1, f64::from((n + 1) / 2))).collect();
