@@ -71,7 +71,8 @@ impl Candidates {
             return;
         }
         let free_until = |bodies: &[crate::plan::anatomy::Body], margin_m: f64| {
-            let steps = (to_m / STEP_M) as usize;
+            // The tip goes half a seed deeper than the middle of the deepest one.
+            let steps = ((to_m + 0.5 * SEED_LENGTH_M) / STEP_M) as usize;
             let is_blocked = |along_m: f64| bodies.iter().any(|b| b.is_near(at(along_m), inwards, margin_m));
             (0..=steps)
                 .map(|s| s as f64 * STEP_M)
