@@ -4,13 +4,27 @@ use super::TissueLoop;
 use crate::rt::exchange::Happened;
 use crate::rt::seed::Seed;
 use nalgebra::Vector3;
-use stylet_shm_schema::{MAX_SEEDS, RefusalCode, SEED_LENGTH_M, SEED_RADIUS_M};
+use stylet_shm_schema::{MAX_SEEDS, RefusalCode, SEED_LENGTH_M, SEED_RADIUS_M, TOUCHING_M};
 use stylet_sim::line::{Line, push};
 use stylet_sim::tissue::MaterialPoint;
 
 /// Largest offset between two seeds of one needle, which also share a direction (cosine of 5 degrees).
 const ON_NEEDLE_M: f64 = 2e-3;
 const PARALLEL: f64 = 0.996;
+
+/// Returns the first of these seeds, the shallowest first, that one at the tip would not pass: those that it would
+/// overlap, and those that lie against them on the way to the entry.
+fn not_passed(fronts_m: &[f64], tip_m: f64) -> usize {
+    let overlapped = fronts_m.partition_point(|front_m| *front_m < tip_m - SEED_LENGTH_M);
+    let mut first = overlapped;
+    while let Some(deeper_m) = fronts_m.get(first)
+        && let Some(next) = first.checked_sub(1)
+        && deeper_m - fronts_m[next] < SEED_LENGTH_M + TOUCHING_M
+    {
+        first = next;
+    }
+    first
+}
 
 impl TissueLoop {
     pub(super) fn drop_seed(&mut self, strand_pitch_m: Option<f64>) -> Result<(), RefusalCode> {
@@ -58,7 +72,7 @@ impl TissueLoop {
     fn join_column(&mut self, line: &Line) -> f64 {
         let body = &self.world.scene.body;
         let (tip_m, [axis, first, second]) = (self.state.loads.tip_material_m, line.axes.map(Vector3::from));
-        // Fronts of the seeds that the new one would not pass, and their numbers, the nearest first.
+        // Fronts of the seeds in this track, and their numbers, the shallowest first.
         let (mut fronts_m, mut numbers, mut count) = ([0.0; MAX_SEEDS], [0; MAX_SEEDS], 0);
         for (number, seed) in self.seeds.iter().enumerate() {
             let from_entry_m = Vector3::from(seed.tip.rest_m(body)) - Vector3::from(line.entry_m);
@@ -67,7 +81,7 @@ impl TissueLoop {
             let is_along = seed
                 .track_to_entry
                 .is_some_and(|to_entry| -axis.dot(&Vector3::from(to_entry)) > PARALLEL);
-            if !is_along || beside_m > 2.0 * SEED_RADIUS_M || front_m < tip_m - SEED_LENGTH_M {
+            if !is_along || beside_m > 2.0 * SEED_RADIUS_M {
                 continue;
             }
             let at = fronts_m[..count].iter().position(|f| *f > front_m).unwrap_or(count);
@@ -76,9 +90,10 @@ impl TissueLoop {
             (fronts_m[at], numbers[at]) = (front_m, number);
             count += 1;
         }
+        let first = not_passed(&fronts_m[..count], tip_m);
         let before_m = fronts_m;
-        let front_m = push(&mut fronts_m[..count], tip_m, &self.state.loads.hold);
-        for n in (0..count).filter(|&n| fronts_m[n] != before_m[n]) {
+        let front_m = push(&mut fronts_m[first..count], tip_m, &self.state.loads.hold);
+        for n in (first..count).filter(|&n| fronts_m[n] != before_m[n]) {
             self.shift_seed(numbers[n], (axis * (fronts_m[n] - before_m[n])).into());
         }
         front_m
@@ -133,5 +148,24 @@ impl TissueLoop {
         self.seeds.pop().ok_or(RefusalCode::NoSeedToUndo)?;
         self.state.response.seed_count = self.seeds.len() as u32;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const L: f64 = SEED_LENGTH_M;
+
+    /// A second seed that rested against the first, just behind a tip that had not moved on, was passed by the third: in
+    /// `pelvis` two seeds came to rest at one place.
+    #[test]
+    fn a_seed_passes_none_that_lies_against_those_at_the_tip() {
+        let fronts_m = [0.01, 0.05 - 2.0 * L, 0.05 - L, 0.05];
+        assert_eq!(not_passed(&fronts_m, 0.05), 1);
+        assert_eq!(not_passed(&fronts_m, 0.05 + 1e-4), 1);
+        assert_eq!(not_passed(&fronts_m, 0.06), 4);
+        assert_eq!(not_passed(&fronts_m, 0.01), 0);
+        assert_eq!(not_passed(&[], 0.05), 0);
     }
 }
