@@ -11,7 +11,7 @@ COMPRESSED = --features stylet-files/compressed
 PACKAGED = $(COMPRESSED) --features host-ui/screen-reader
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release package package-test picture example report seeds-oracle causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -56,6 +56,9 @@ example: build ## Record the example session of the window again
 
 report: ## Measure speed against error of every tissue model; writes benches/runs/<date>-<host> (some minutes)
 	$(CARGO) run --release -p stylet-benches --bin report
+
+seeds-oracle: ## Compare seeds, forces and motion of the gland with tests/oracles/seeds_at_rest.py in every case of docs/physics/needle-line.md
+	$(CARGO) test --profile quick -p stylet-runtime --lib by_another_method -- --ignored --nocapture
 
 causes: ## Inject ten causes of late ticks into measurements, and see which of them the trace names (as root, about a minute)
 	$(CARGO) build --profile quick --workspace --bin rt-core --bin stylet-bridge --bin stylet-lab

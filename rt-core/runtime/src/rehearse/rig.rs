@@ -5,7 +5,7 @@ use crate::rt::haptic_tape::HapticMemory;
 use crate::rt::world::World;
 use crate::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
 use nalgebra::Vector3;
-use stylet_hw::{DeviceInfo, Hand, SimulatedPhantom, SimulatedPhantomConfig};
+use stylet_hw::{Device, DeviceInfo, Hand, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_shm_schema::{HandMove, HapticState, NeedleRehearsal, RefusalCode, SeedPose};
 use stylet_sim::active::Active;
 use stylet_sim::line::{LeftNeedles, LeftRecord, ReadyLine};
@@ -34,9 +34,14 @@ impl Rig {
             start_direction: direction,
             ..SimulatedPhantomConfig::default()
         });
-        let memory = HapticMemory::new(device, (active.needle, active.force), 0);
+        Self::with_device(world, active, device, Box::new(phantom))
+    }
+
+    /// Makes loops over a device that moves by itself.
+    pub fn with_device(world: Box<World>, active: &Active, info: &DeviceInfo, device: Box<dyn Device>) -> Self {
+        let memory = HapticMemory::new(info, (active.needle, active.force), 0);
         Self {
-            loops: SteppedLoops::new(world, Box::new(phantom), &memory, HAPTIC_TICKS_PER_TISSUE_TICK),
+            loops: SteppedLoops::new(world, device, &memory, HAPTIC_TICKS_PER_TISSUE_TICK),
             refusal: None,
             lines: Vec::new(),
         }

@@ -12,6 +12,7 @@ mod bending;
 mod carrying;
 mod folds;
 mod left;
+mod independent;
 mod migration;
 mod order;
 mod paper;

@@ -42,6 +42,10 @@ impl Rig {
         });
     }
 
+    pub fn line_state(&self) -> Option<&stylet_sim::line::LineState> {
+        self.loops.haptic.line_state()
+    }
+
     pub fn response(&self) -> &TissueResponse {
         self.loops.tissue.response()
     }

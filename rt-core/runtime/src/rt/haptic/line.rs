@@ -25,6 +25,12 @@ impl HapticLoop {
         self.line.as_ref()?.track()
     }
 
+    /// Returns the state of the present line.
+    #[cfg(test)]
+    pub fn line_state(&self) -> Option<&stylet_sim::line::LineState> {
+        self.line.as_ref().map(|line| line.state())
+    }
+
     /// Follows the probe's displacement of the lines in this tissue tick. Costs one comparison without a probe.
     pub(super) fn follow_outside(&mut self, tissue: &TissueResponse) {
         if tissue.outside == self.memory.outside {
