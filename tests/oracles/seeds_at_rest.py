@@ -12,10 +12,7 @@ the tip reaches sticks where it is and begins without force. The tip cuts at its
 of y + u(y) = s. The membrane at the entry is a spring from rest to its force and depth. Then seeds in a column, as docs/physics/seeds.md
 says, or on a strand.
 
-Two tips: `needle` has the needle's radius in all that it does. `patch` has it for its own compliance alone, and a sphere of 2.5 mm where
-the tip moves the shaft or the shaft moves the tip, which is what docs/physics/needle-line.md says of Stylet.
-
-Lines of the CSV: mesh, tip, friction in N/m, toughness in J/m2, name, numbers. Offsets of seeds from plan in mm, deepest first; total
+Lines of the CSV: mesh, friction in N/m, toughness in J/m2, name, numbers. Offsets of seeds from plan in mm, deepest first; total
 and tip force in N at 10, 20 and 30 mm, at the turn and before each later drop; displacement along the needle of the mean cell, and of
 cells (numbers in the scene's grid), in mm at the turn. Units here: m, N. z along the needle from the entry.
 """
@@ -33,15 +30,13 @@ from gland_on_springs import KELVIN, NEEDLE, POISSON, SHEAR, Body, gauss, kelvin
 
 SEED, SEED_RADIUS = 4.5e-3, 0.4e-3
 MEMBRANE_N, MEMBRANE_M = 5.6, 8e-3
-PATCH = 2.5e-3
 WEDGE_N = np.pi * SHEAR * NEEDLE**2
 
 
 class Line:
     """Compliance between pieces of the needle's shaft and its tip anywhere along it."""
 
-    def __init__(self, body, piece_m, patch_m=NEEDLE):
-        """`patch_m` is the radius of the sphere that stands for the tip where it moves the shaft, and the shaft it."""
+    def __init__(self, body, piece_m):
         self.length_m = body.size_m
         self.m = int(round(body.size_m / piece_m))
         self.piece_m = body.size_m / self.m
@@ -61,7 +56,7 @@ class Line:
         table = np.zeros((len(grid), self.m))
         for q, weight in zip(p, w):
             at = self.middle_m + q * self.piece_m / 2
-            table += weight / 2 * self.sphere(at[None, :] - grid[:, None], patch_m)
+            table += weight / 2 * self.sphere(at[None, :] - grid[:, None], NEEDLE)
         table += self.spline(np.clip(grid, *self.ends), inside)
         own = (5 - 6 * POISSON) / (24 * np.pi * SHEAR * (1 - POISSON) * NEEDLE) + np.array([self.spline(a, a)[0, 0] for a in np.clip(grid, *self.ends)])
         self.by_tip, self.own = scipy.interpolate.CubicSpline(grid, table), scipy.interpolate.CubicSpline(grid, own)
@@ -277,24 +272,23 @@ def results(body, mesh, piece_m, step_m, centres):
     lines, places = [], centres[0]
     often = np.where(places[:, 0] > 1e-9, 2, 1)
     shown = np.flatnonzero(np.hypot(places[:, 0], places[:, 1]) > 4e-3)[:: len(places) // 40]
-    for tip, patch_m in (("needle", NEEDLE), ("patch", PATCH)):
-        line = Line(body, piece_m, patch_m)
-        for friction, toughness in CASES:
-            begun = time.process_time()
-            out = run(line, body, friction, toughness, step_m, centres)
-            add = lambda name, values, form=".4f": lines.append(
-                f"{mesh},{tip},{friction:g},{toughness:g},{name}," + ",".join(format(v, form) for v in values)
-            )
-            add("loose_mm", 1e3 * out["loose"])
-            add("strand_mm", 1e3 * out["strand"])
-            add("material_mm", 1e3 * np.array(out["material"]))
-            add("force_n", [f[2] for f in out["forces"]])
-            add("tip_n", [f[3] for f in out["forces"]])
-            add("mean_mm", [1e3 * (often * out["gland"][:, 2]).sum() / often.sum()])
-            print("\n".join(lines[-6:]))
-            print(f"  {out['fallbacks']} by least squares, {time.process_time() - begun:.1f} s", flush=True)
-            for n in shown:
-                add("cell", [*body.right[n], *1e3 * out["gland"][n]], ".5g")
+    line = Line(body, piece_m)
+    for friction, toughness in CASES:
+        begun = time.process_time()
+        out = run(line, body, friction, toughness, step_m, centres)
+        add = lambda name, values, form=".4f": lines.append(
+            f"{mesh},{friction:g},{toughness:g},{name}," + ",".join(format(v, form) for v in values)
+        )
+        add("loose_mm", 1e3 * out["loose"])
+        add("strand_mm", 1e3 * out["strand"])
+        add("material_mm", 1e3 * np.array(out["material"]))
+        add("force_n", [f[2] for f in out["forces"]])
+        add("tip_n", [f[3] for f in out["forces"]])
+        add("mean_mm", [1e3 * (often * out["gland"][:, 2]).sum() / often.sum()])
+        print("\n".join(lines[-6:]))
+        print(f"  {out['fallbacks']} by least squares, {time.process_time() - begun:.1f} s", flush=True)
+        for n in shown:
+            add("cell", [*body.right[n], *1e3 * out["gland"][n]], ".5g")
     return lines
 
 

@@ -2,11 +2,16 @@
 //! needle.
 
 use super::columns::Column;
+use super::near::NearTip;
 use super::rows::Rows;
 use super::stations::Stations;
 use crate::tissue::fem::Compiled;
 use crate::tissue::fem::batch::BatchModel;
 use serde::{Deserialize, Serialize};
+
+/// Shortest end of a shaft that loads a station, over the station's length. The shorter, the less a result depends on
+/// the spacing and the more on the hand's steps, and 0.25 stores no energy at some places (ADR 26).
+const SHORTEST: f64 = 0.5;
 
 /// Stations that were all solved for: symmetric, positive definite. Rows 0 to m - 1 are the shaft's stations, m to 2m -
 /// 1 the tip's patch at the same places.
@@ -27,6 +32,8 @@ pub struct Compliance {
     pub(super) rows: Rows,
     /// Compliance of the tip at each station that its rows lack in a tip of the needle's radius, m/N.
     pub tip_missing_m_per_n: Vec<f64>,
+    /// How that falls off along the needle: what tip and shaft lack of moving each other.
+    pub near: NearTip,
     /// Force on the tip at each station that opens the cut to the needle's width, N.
     pub wedge_n: Vec<f64>,
     /// Distance of stations across, m.
@@ -77,6 +84,7 @@ impl Compliance {
             across_spacing_m: stations.group() as f64 * stations.settings.spacing_m,
             rows,
             tip_missing_m_per_n: stations.tip_missing_m_per_n.clone(),
+            near: stations.near.clone(),
             wedge_n: stations.wedge_n.clone(),
             across: sides,
             foundation: axial.iter().map(foundation).collect(),
@@ -111,6 +119,7 @@ impl Compliance {
             across_spacing_m: spacing_m,
             rows: Rows::new(2 * stations, entry),
             tip_missing_m_per_n: vec![0.0; stations],
+            near: NearTip::default(),
             wedge_n: vec![0.0; stations],
             across: [Rows::default(), Rows::default()],
             foundation: vec![-1.0; 2 * stations],
@@ -151,12 +160,24 @@ impl Compliance {
         [&self.tip_missing_m_per_n, &self.wedge_n]
             .iter()
             .all(|each| each.len() == self.stations && each.iter().all(|v| v.is_finite() && *v >= 0.0))
+            && self.near.is_whole()
     }
 
     /// Returns the compliance that the tip's rows lack where its load has these weights, m/N.
     pub(super) fn tip_missing_m_per_n(&self, range: std::ops::Range<usize>, weights: &[f64]) -> f64 {
         let places = self.tip_missing_m_per_n.iter().skip(range.start).zip(weights);
         places.take(range.len()).map(|(missing, weight)| missing * weight).sum()
+    }
+
+    /// Returns what a newton on a tip at `tip_m` moves station `n` of a shaft that ends at `end_m`, and a newton on the
+    /// station that tip, beyond its rows, m/N; `missing` is what the tip itself lacks there.
+    #[inline]
+    pub(super) fn near_m_per_n(&self, missing: f64, tip_m: f64, n: usize, end_m: f64) -> f64 {
+        let ds = self.spacing_m;
+        let to_m = ((n + 1) as f64 * ds).min(end_m);
+        // A shorter load would move itself by more than its row has.
+        let from_m = (n as f64 * ds).min(to_m - SHORTEST * ds);
+        missing * self.near.mean(from_m - tip_m, to_m - tip_m)
     }
 
     /// Returns the displacement of row `i` by a newton at row `j`, m/N.

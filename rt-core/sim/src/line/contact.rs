@@ -259,14 +259,18 @@ pub(super) fn lay(model: &LineModel, state: &mut LineState) -> usize {
         state.tip.force_n = 0.0;
     }
     let m = c.stations;
-    let column = &mut state.tip_column[..now];
-    column.fill(0.0);
-    state.tip_own = c.tip_missing_m_per_n(state.tip_range.clone(), &state.tip_weights);
+    state.tip_column[..now].fill(0.0);
+    let missing = c.tip_missing_m_per_n(state.tip_range.clone(), &state.tip_weights);
+    state.tip_own = missing;
     for (n, &weight) in state.tip_range.clone().zip(&state.tip_weights) {
         let row = c.rows.row(m + n);
-        add_scaled(weight, &row[..now], column);
+        add_scaled(weight, &row[..now], &mut state.tip_column[..now]);
         let tips = row[m..].iter().skip(state.tip_range.start).zip(&state.tip_weights);
         state.tip_own += weight * tips.take(state.tip_range.len()).map(|(r, w)| r * w).sum::<f64>();
+    }
+    let tip_m = state.tip.material_m;
+    for n in state.near_stations(model) {
+        state.tip_column[n] += c.near_m_per_n(missing, tip_m, n, tip_m);
     }
     before
 }

@@ -31,6 +31,7 @@ mod contact;
 mod cross;
 mod left;
 mod model;
+mod near;
 mod outside;
 pub mod prony;
 mod ready;

@@ -260,7 +260,7 @@ impl HandLine {
     pub fn tip_displacement_m(&self) -> f64 {
         let load_n: f64 = self.state.loads_n().iter().sum::<f64>() + self.state.whole_n();
         let near_m = if self.state.membrane_n_per_m == 0.0 {
-            self.state.memory.gain * self.tip_missing_m_per_n() * self.state.tip.force_n
+            self.state.near_m(&self.model)
         } else {
             self.state.tip.ahead_m
         };

@@ -174,9 +174,26 @@ impl LineState {
         let missing = model
             .compliance
             .tip_missing_m_per_n(self.tip_range.clone(), &self.tip_weights);
-        let near_tip_j = 0.5 * missing * self.tip.force_n * self.tip.force_n;
+        let near_tip_j = (self.near_m(model) / self.memory.gain - 0.5 * missing * self.tip.force_n) * self.tip.force_n;
         let common_m_per_n = model.compliance.common_m_per_n();
         at_once + near_tip_j + self.memory.stored_j(rows, common_m_per_n, &model.settings.prony)
+    }
+
+    /// Returns the stations that the tip moves by more than the rows say.
+    pub(super) fn near_stations(&self, model: &LineModel) -> std::ops::Range<usize> {
+        let c = &model.compliance;
+        c.near.stations(self.tip.material_m, c.spacing_m, self.in_contact)
+    }
+
+    /// Returns how far tip and shaft move the tip beyond what the rows say, m.
+    pub(super) fn near_m(&self, model: &LineModel) -> f64 {
+        let (c, tip_m) = (&model.compliance, self.tip.material_m);
+        let missing = c.tip_missing_m_per_n(self.tip_range.clone(), &self.tip_weights);
+        let of_shaft_m: f64 = self
+            .near_stations(model)
+            .map(|n| c.near_m_per_n(missing, tip_m, n, tip_m) * self.shaft_n[n])
+            .sum();
+        self.memory.gain * (missing * self.tip.force_n + of_shaft_m)
     }
 
     /// Returns the part of the tip's force that moves the body as a whole and is not among the loads, N.

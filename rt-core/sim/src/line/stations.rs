@@ -1,5 +1,6 @@
 //! Stations along the needle's way through the tissue at rest, and where each of them loads the lattice.
 
+use super::near::NearTip;
 use crate::tissue::fem::Compiled;
 use crate::tissue::fem::batch::{BatchModel, NodeWeight, Part};
 use serde::{Deserialize, Serialize};
@@ -89,6 +90,8 @@ pub struct Stations {
     pub missing_m_per_n: Vec<f64>,
     /// Compliance of the tip at each station that its patch lacks in a tip of the needle's radius, m/N.
     pub tip_missing_m_per_n: Vec<f64>,
+    /// How that falls off along the needle.
+    pub near: NearTip,
     /// Force on the tip at each station that opens the cut to the needle's width, N.
     pub wedge_n: Vec<f64>,
 }
@@ -103,10 +106,12 @@ impl Stations {
             tip: Vec::new(),
             missing_m_per_n: Vec::new(),
             tip_missing_m_per_n: Vec::new(),
+            near: NearTip::default(),
             wedge_n: Vec::new(),
         };
         let radius_m = settings.needle_radius_m;
-        let beyond_patch = (1.0 / radius_m - 1.0 / stations.patch_radius_m(model.spacing_m())).max(0.0);
+        let patch_radius_m = stations.patch_radius_m(model.spacing_m());
+        let beyond_patch = (1.0 / radius_m - 1.0 / patch_radius_m).max(0.0);
         for n in 0..most {
             let middle_m = (n as f64 + 0.5) * settings.spacing_m;
             let Some([shear_pa, nu]) = model.material(line.point_m(middle_m, [0.0; 2])) else {
@@ -121,6 +126,9 @@ impl Stations {
             }
             let ratio = super::compliance::lattice_radius_m(model, &stations, middle_m) / radius_m;
             let per_length = ratio.ln().max(0.0) / (std::f64::consts::TAU * shear_pa);
+            if n == 0 {
+                stations.near = NearTip::new(radius_m, patch_radius_m, nu);
+            }
             stations.missing_m_per_n.push(per_length / settings.spacing_m);
             stations
                 .tip_missing_m_per_n

@@ -99,6 +99,7 @@ impl LineModel {
 /// Displacement of the material around the tip under the present loads of the shaft; the tip's own part moves with it.
 struct Around<'a> {
     model: &'a LineModel,
+    shaft_n: &'a [f64],
     first: usize,
     count: usize,
     u_m: [f64; WINDOW],
@@ -110,7 +111,7 @@ struct Around<'a> {
 
 impl<'a> Around<'a> {
     /// Makes the stretch so far before and behind the tip.
-    fn new(model: &'a LineModel, state: &LineState, reach_m: f64) -> Self {
+    fn new(model: &'a LineModel, state: &'a LineState, reach_m: f64) -> Self {
         let c = &model.compliance;
         let half_m = 0.5 * c.tip_length_m.max(c.spacing_m) + reach_m;
         let place_m = state.tip.material_m.clamp(0.0, model.length_m());
@@ -118,6 +119,7 @@ impl<'a> Around<'a> {
         let end = (((place_m + half_m) / c.spacing_m).ceil() as usize + 1).min(c.stations);
         let mut around = Around {
             model,
+            shaft_n: &state.shaft_n[..state.in_contact],
             first,
             count: end.saturating_sub(first).min(WINDOW),
             u_m: [0.0; WINDOW],
@@ -146,10 +148,24 @@ impl<'a> Around<'a> {
             let at = n.saturating_sub(self.first).min(self.count.saturating_sub(1));
             let row = &c.rows.row(c.stations + n)[c.stations + range.start..];
             let own: f64 = row.iter().zip(&weights[..range.len()]).map(|(r, w)| r * w).sum();
-            let own = own + c.tip_missing_m_per_n[n];
             u_m += weight * (self.u_m[at] + self.tip_n * own + friction * c.rows.row(c.stations + n)[last]);
         }
-        place_m + u_m - tip_m
+        place_m + u_m + self.near_m(place_m, c.tip_missing_m_per_n(range, &weights), friction) - tip_m
+    }
+
+    /// Returns how far a tip at this place is moved by itself and the shaft behind it beyond what the rows say.
+    fn near_m(&self, place_m: f64, missing: f64, friction: f64) -> f64 {
+        let (c, shaft_n) = (&self.model.compliance, self.shaft_n);
+        let shaft = c.near.stations(place_m, c.spacing_m, shaft_n.len());
+        let of_shaft_m: f64 = shaft
+            .map(|n| shaft_n[n] * c.near_m_per_n(missing, place_m, n, self.from_m))
+            .sum();
+        let of_new_m = if friction > 0.0 {
+            friction * missing * c.near.mean(self.from_m - place_m, 0.0)
+        } else {
+            0.0
+        };
+        missing * self.tip_n + self.gain * of_shaft_m + of_new_m
     }
 }
 

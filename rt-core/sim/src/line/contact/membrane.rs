@@ -29,10 +29,12 @@ pub(in crate::line) fn press(model: &LineModel, state: &mut LineState, membrane:
     let kept = membrane.and_then(|n| model.kept_of_dent(n, state.tip_own - near));
     // A membrane that is stiffer than the tissue spreads the load over the patch, and no tissue is dented more narrowly.
     let near = if kept.is_some_and(|kept| kept < 1.0) { near } else { 0.0 };
-    if held_by != state.tip.held_by {
+    let near_m = state.near_m(model);
+    let is_met = held_by != state.tip.held_by;
+    if is_met {
         let load_n = state.shaft_n[..count].iter().sum::<f64>() + state.tip.force_n;
         state.tip.met_u_m = if held_by == 0 { 0.0 } else { state.tip_u_m };
-        state.tip.ahead_m = state.memory.gain * near * state.tip.force_n;
+        state.tip.ahead_m = if near > 0.0 { near_m } else { 0.0 };
         state.tip.met_dent_m = if held_by == 0 {
             0.0
         } else {
@@ -43,6 +45,16 @@ pub(in crate::line) fn press(model: &LineModel, state: &mut LineState, membrane:
     (state.tip_offset_m, state.membrane_n_per_m) = (0.0, 0.0);
     let kept = kept?;
     state.tip_own -= near;
+    // Nor is the shaft near it moved; it is where it was when the tip met the membrane.
+    for n in state.near_stations(model) {
+        let near = model
+            .compliance
+            .near_m_per_n(near, state.tip.material_m, n, state.tip.material_m);
+        let less_m = state.memory.gain * near * state.tip.force_n;
+        state.tip_column[n] -= near;
+        state.u_m[n] -= less_m;
+        state.anchor_m[n] += if is_met { less_m } else { 0.0 };
+    }
     state.membrane_n_per_m = (1.0 / kept - 1.0) / (state.tip_own - whole);
     // Tissue that gives way within the tick leaves the spring more of the dent.
     let gain = state.memory.gain;

@@ -6,6 +6,7 @@ use stylet_random::Random;
 
 use super::*;
 use crate::line::columns::{ColumnQueue, TOLERANCE, tests::paper};
+use crate::line::near::NearTip;
 use crate::line::{Compliance, LineLayer, LineSettings, NEEDLE_RADIUS_M, PronyTerm};
 use stylet_heap as heap;
 
@@ -218,7 +219,8 @@ fn speed_does_not_decide_where_seeds_go() {
         );
         worst = (worst.0.max(place_m), worst.1.max(force));
     }
-    assert!(worst.0 < 0.05e-3 && worst.1 < 0.02);
+    // The force of the last station, which the tip moves the most, depends on the step: ADR 26.
+    assert!(worst.0 < 0.15e-3 && worst.1 < 0.02);
 }
 
 #[test]
@@ -230,7 +232,7 @@ fn half_the_tick_and_half_the_spacing_change_little() {
     println!("tick: seeds {:.4} mm, force {:.3} %", 1e3 * place_m, 100.0 * force);
     let by_tick = (place_m, force);
     let halves = run(solved(true), 0.1e-3);
-    // The first place is 1.7 mm behind the surface, where half of the tip's patch is outside: no bar is met there.
+    // The tip has just leapt there from the surface, in the tick in which the membrane gave way: ADR 26.
     let largest = ours[4].force_on_hand_n.abs();
     let near = difference_of(&ours[..1], &halves[..1], largest);
     println!(
@@ -238,7 +240,7 @@ fn half_the_tick_and_half_the_spacing_change_little() {
         1e3 * near.0,
         100.0 * near.1
     );
-    assert!(near.0 < 0.25e-3 && near.1 < 0.02);
+    assert!(near.0 < 0.3e-3 && near.1 < 0.02);
     let (place_m, force) = difference_of(&ours[1..], &halves[1..], largest);
     println!("ours   {}\nhalves {}", figures(&ours), figures(&halves));
     println!("spacing: seeds {:.4} mm, force {:.3} %", 1e3 * place_m, 100.0 * force);
@@ -282,9 +284,32 @@ fn a_narrow_tip_that_cuts_makes_no_energy() {
     let mut model = made_up(30, 1.364e-3, &layers, LineSettings::default());
     model.compliance.whole_m_per_n = 1.0 / 1434.0;
     model.compliance.tip_missing_m_per_n.fill(11e-3);
+    model.compliance.near = NearTip::new(0.635e-3, 2.5e-3, 0.49);
     model.compliance.wedge_n.fill(0.02);
     let worst_j = random_cycles(&model, 10_000, LineState::elastic_j);
     assert!(worst_j < 1e-6, "{worst_j}");
+}
+
+/// Wherever the tip is, shaft and tip have one compliance that stores energy.
+#[test]
+fn a_narrow_tip_and_its_shaft_are_positive_definite_at_every_place() {
+    for model in [solved(false), solved(true)] {
+        let (m, mut state, mut least) = (model.compliance.stations, LineState::new(model), f64::INFINITY);
+        for place in 1..8 * m {
+            state.tip.material_m = 0.125 * place as f64 * model.compliance.spacing_m;
+            lay(model, &mut state);
+            let count = state.in_contact;
+            let shaft = nalgebra::DMatrix::from_fn(count, count, |i, j| model.compliance.at(i, j));
+            let column = nalgebra::DVector::from_column_slice(&state.tip_column[..count]);
+            let solved = shaft.cholesky().expect("positive definite").solve(&column);
+            least = f64::min(least, 1.0 - column.dot(&solved) / state.tip_own);
+        }
+        println!(
+            "{:.3} of what the tip moves itself is left where the shaft sticks",
+            least
+        );
+        assert!(least > 0.05, "{least}");
+    }
 }
 
 /// Returns the most that a hand moving to and fro at random can have gained in any stretch of ticks beyond what was

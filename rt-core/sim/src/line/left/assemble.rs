@@ -36,6 +36,21 @@ impl PairCoupling<'_> {
 }
 
 impl LeftNeedle {
+    /// Returns what its tip and an element lack of moving each other.
+    fn near_m_per_n(&self, element: usize) -> f64 {
+        let (c, tip_m) = (&self.line.model.compliance, self.line.state.tip.material_m);
+        let missing = self.line.tip_missing_m_per_n();
+        if element == self.stations {
+            return missing;
+        }
+        let is_near = c.near.stations(tip_m, c.spacing_m, self.stations).contains(&element);
+        if is_near {
+            c.near_m_per_n(missing, tip_m, element, tip_m)
+        } else {
+            0.0
+        }
+    }
+
     /// Returns the rows of its line that an element loads, each with its share.
     pub(super) fn rows(&self, element: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
         let state = &self.line.state;
@@ -62,8 +77,11 @@ impl LeftNeedles {
                 for i in 0..=a.stations {
                     for j in 0..=b.stations {
                         let pairs = a.rows(i).flat_map(|(p, w)| b.rows(j).map(move |(q, v)| (p, q, w * v)));
-                        let is_tip = is_same && i == a.stations && j == a.stations;
-                        let missing = if is_tip { a.line.tip_missing_m_per_n() } else { 0.0 };
+                        let missing = if is_same && j == a.stations {
+                            a.near_m_per_n(i)
+                        } else {
+                            0.0
+                        };
                         let entry: f64 = pairs
                             .map(|(p, q, w)| {
                                 w * if is_same {
