@@ -32,6 +32,6 @@ fn a_stretch_of_shaft_is_moved_as_by_an_evenly_loaded_sphere() {
         assert!((found - wanted).abs() < 0.01, "{from_m}: {found} {wanted}");
         assert!((near.mean(-to_m, -from_m) - found).abs() < 1e-12);
     }
-    // The needle's surface is that of the sphere, where the closed form of its outside lacks a little of the inside's.
+    // The table has steps.
     assert!((near.mean(-1e-6, 1e-6) - 1.0).abs() < 0.005);
 }
