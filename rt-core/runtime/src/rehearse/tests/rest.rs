@@ -108,6 +108,25 @@ fn points_lie_nearer_to_each_other_than_seeds() {
 fn seeds_by_each_number() {
     use ParameterId as P;
     let (mut stage, run, stop) = (stage(), default_procedure(), AtomicBool::new(false));
+    let points = NeedleRehearsal {
+        as_points: true,
+        ..run.clone()
+    };
+    let mut row = |name: &str, run: &NeedleRehearsal, set: &ParameterSet| {
+        let rehearsed = stage.rehearse(run, set, &stop).expect("goes through");
+        let pairs = rehearsed.seeds.iter().zip(&run.drops_m);
+        let off_mm: Vec<f64> = pairs.map(|(s, d)| (s.position_m[2] - d[2]) * 1e3).collect();
+        let touching = rehearsed.seeds.windows(2).filter(|pair| pair[0].touches(&pair[1]));
+        let mean_mm = off_mm.iter().map(|mm| mm.abs()).sum::<f64>() / off_mm.len() as f64;
+        let each: Vec<String> = off_mm.iter().map(|mm| format!("{mm:+.1}")).collect();
+        println!(
+            "| {name} | {} | {mean_mm:.1} | {} | {:.1} | {:.2} |",
+            each.join(", "),
+            touching.count(),
+            rehearsed.largest_displacement_m * 1e3,
+            rehearsed.peak_force_n
+        );
+    };
     let varied: [(P, &[f64]); 3] = [
         (P::GlandToughness, &[0.0, 50.0, 164.0, 300.0, 500.0]),
         (P::ShaftFriction, &[0.0, 18.0, 80.0, 140.0, 210.0]),
@@ -123,26 +142,8 @@ fn seeds_by_each_number() {
         for value in values {
             let mut set = ParameterSet::default();
             set.set(id, value / display_per_si);
-            let rehearsed = stage.rehearse(&run, &set, &stop).expect("goes through");
-            let off_mm: Vec<f64> = rehearsed
-                .seeds
-                .iter()
-                .zip(&run.drops_m)
-                .map(|(s, d)| (s.position_m[2] - d[2]) * 1e3)
-                .collect();
-            let touching = rehearsed
-                .seeds
-                .windows(2)
-                .filter(|pair| pair[0].touches(&pair[1]))
-                .count();
-            let mean_mm = off_mm.iter().map(|mm| mm.abs()).sum::<f64>() / off_mm.len() as f64;
-            let each: Vec<String> = off_mm.iter().map(|mm| format!("{mm:+.1}")).collect();
-            println!(
-                "| `{key}` {value} {unit} | {} | {mean_mm:.1} | {touching} | {:.1} | {:.2} |",
-                each.join(", "),
-                rehearsed.largest_displacement_m * 1e3,
-                rehearsed.peak_force_n
-            );
+            row(&format!("`{key}` {value} {unit}"), &run, &set);
         }
     }
+    row("points, without a body", &points, &ParameterSet::default());
 }
