@@ -120,7 +120,7 @@ pub use stylet_settings::{
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 18;
+pub const SCHEMA_VERSION: u32 = 19;
 
 const _: () = assert!(
     PARAMETER_COUNT == 57,

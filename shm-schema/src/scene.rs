@@ -3,7 +3,7 @@
 use crate::{GridInfo, MAX_STRUCTURES, Text};
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
-use stylet_anatomy::PatientFrame;
+use stylet_anatomy::{Layer, PatientFrame};
 
 /// Role of a structure, as bits of [`StructureInfo::role`] and [`UploadStructure::role`].
 pub mod role {
@@ -183,6 +183,8 @@ pub struct UploadHeader {
     pub spacing_m: f64,
     /// Patient (RAS, m) from scene: row-major rotation, then translation.
     pub patient_from_scene: [f64; 12],
+    /// Thickness, m, and Young's modulus, Pa, of each layer around the body, the innermost first; zeros end them.
+    pub layers: [[f64; 2]; Layer::MOST],
     /// Name of the volume.
     pub name: Text<64>,
     /// The first `structure_count` are in use.

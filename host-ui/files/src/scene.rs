@@ -9,7 +9,7 @@ use super::volume::{LabelVolume, Tissue, Voxels, role_and_material};
 use crate::error::ContentError;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use stylet_anatomy::{Beyond, Material, Role, Surroundings};
+use stylet_anatomy::{Beyond, Layer, Material, Role, Surroundings};
 
 const MAX_BYTES: usize = 1 << 20;
 const MAX_STRUCTURES: usize = 255;
@@ -26,6 +26,8 @@ pub struct SceneFile {
     pub image: Option<PathBuf>,
     /// Structures; if empty, those named in the volume.
     structures: Vec<Part>,
+    /// Layers around the body, the innermost first.
+    pub layers: Vec<Layer>,
     /// Speed of insertion, in m/s.
     pub insert_m_per_s: Option<f64>,
     /// Speed of retraction, in m/s.
@@ -54,7 +56,7 @@ struct Part {
     shear_deg: Option<f64>,
     /// True if it never moves.
     fixed: Option<bool>,
-    surroundings: Option<Around>,
+    surroundings: Option<Support>,
 }
 
 /// Role of a structure by its word in the file.
@@ -71,12 +73,12 @@ enum Aim {
 /// Support at the outside of the body: one word for all faces, or six for those towards -x, +x, -y, +y, -z, +z.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(untagged, expecting = "must be a word, or a list of six words")]
-enum Around {
+enum Support {
     All(String),
     Faces([String; 6]),
 }
 
-impl Around {
+impl Support {
     fn surroundings(&self) -> Option<Surroundings> {
         let faces = match self {
             Self::All(word) => return Beyond::of_name(word).map(Surroundings::all),
@@ -97,9 +99,19 @@ struct Tables {
     #[serde(default)]
     structure: Vec<Part>,
     #[serde(default)]
+    layer: Vec<Around>,
+    #[serde(default)]
     needle: Speeds,
     device: Option<Device>,
     plan: Option<Referred>,
+}
+
+/// Layer of soft tissue around the body.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Around {
+    thickness_mm: f64,
+    young_kpa: f64,
 }
 
 #[derive(Deserialize)]
@@ -142,13 +154,14 @@ pub fn read(path: &Path) -> Result<SceneFile, FileError> {
 /// Loads the volume of a scene file, with the structures that the file defines.
 pub fn load(path: &Path, progress: &Progress) -> Result<(SceneFile, LabelVolume), FileError> {
     let scene = read(path)?;
+    let layers = scene.layers.clone();
     let path_of_volume = path.with_file_name(&scene.volume);
     let voxels = read_voxels(&path_of_volume, progress)?;
     let name = scene.name.clone().unwrap_or_else(|| file_name(path));
     let refused = |why: ContentError| FileError::of(path, why);
     let tissues = scene.tissues(&voxels).map_err(refused)?;
     let volume = LabelVolume::from_tissues(&voxels, tissues, name, progress).map_err(refused)?;
-    Ok((scene, volume))
+    Ok((scene, LabelVolume { layers, ..volume }))
 }
 
 /// Parses the text of a scene file.
@@ -172,8 +185,25 @@ pub fn parse(text: &str) -> Result<SceneFile, ContentError> {
     for (part, number) in tables.structure.iter().zip(1..) {
         problems.extend(part.problems().map(|why| format!("[[structure]] {number}: {why}")));
     }
+    let [[thin, thick], [soft, stiff]] = [Layer::THICKNESS_M.map(|m| m * 1e3), Layer::YOUNG_PA.map(|pa| pa * 1e-3)];
+    for (layer, number) in tables.layer.iter().zip(1..) {
+        let mut check = |name: &str, value: f64, least: f64, most: f64| {
+            if !(least..=most).contains(&value) {
+                problems.push(format!(
+                    "[[layer]] {number}: {name} must be a number from {least} to {most}"
+                ));
+            }
+        };
+        check("thickness_mm", layer.thickness_mm, thin, thick);
+        check("young_kpa", layer.young_kpa, soft, stiff);
+    }
+    if tables.layer.len() > Layer::MOST {
+        problems.push(format!("it has more than {} layers", Layer::MOST));
+    }
     ContentError::all(problems)?;
+    let layers: Vec<Layer> = tables.layer.iter().map(Around::layer).collect();
     Ok(SceneFile {
+        layers: if layers.is_empty() { vec![Layer::FAT] } else { layers },
         name: tables.name,
         volume: tables.volume.file,
         image: tables.image.map(|image| image.file),
@@ -207,6 +237,15 @@ impl SceneFile {
             return Err("all structures are left out".into());
         }
         Ok(tissues)
+    }
+}
+
+impl Around {
+    fn layer(&self) -> Layer {
+        Layer {
+            thickness_m: self.thickness_mm * 1e-3,
+            young_pa: self.young_kpa * 1e3,
+        }
     }
 }
 
@@ -286,7 +325,7 @@ impl Part {
         };
         let limits = self.stretch.zip(self.shear_deg);
         let limits = limits.map(|([short, long], deg)| [[short, long, deg.to_radians()]; 3]);
-        let surroundings = self.surroundings.as_ref().and_then(Around::surroundings);
+        let surroundings = self.surroundings.as_ref().and_then(Support::surroundings);
         Some(Tissue {
             label,
             name,

@@ -10,7 +10,7 @@ use cover::{covered, covers};
 use movable::movable;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
-use stylet_anatomy::{Material, Organ, PatientFrame, Role};
+use stylet_anatomy::{Layer, Material, Organ, PatientFrame, Role};
 
 /// Margin around the tissue.
 const MARGIN_M: f64 = 0.020;
@@ -44,6 +44,8 @@ pub struct LabelVolume {
     pub cells: Vec<u8>,
     /// Tissue of each label; if empty, all tissue is the same.
     pub structures: Vec<Tissue>,
+    /// Layers around the body, the innermost first.
+    pub layers: Vec<Layer>,
     /// Place of the patient in the scene.
     pub patient: PatientFrame,
     /// Name of the volume.
@@ -243,6 +245,7 @@ impl LabelVolume {
                     spacing_m: h,
                     cells,
                     structures: Vec::new(),
+                    layers: vec![Layer::FAT],
                     patient: patient_frame(&voxels.frame, voxels.dims, origin),
                     name,
                     voxels_per_label: present(voxels),

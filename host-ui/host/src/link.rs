@@ -340,6 +340,9 @@ impl Link {
         for (sent, tissue) in header.structures.iter_mut().zip(&volume.structures) {
             *sent = upload_structure(tissue);
         }
+        for (sent, layer) in header.layers.iter_mut().zip(&volume.layers) {
+            *sent = [layer.thickness_m, layer.young_pa];
+        }
         self.ask(id, Outgoing::Upload(Box::new(header), volume.cells.clone()))
     }
 

@@ -12,7 +12,7 @@ use stylet_sim::probe::{PADS_APART_M, ProbeShape, SolvedProbe};
 use stylet_sim::scene::Scene;
 
 /// Ends in the version of the layout and of the solution method.
-const MAGIC: [u8; 8] = *b"STYLPRB2";
+const MAGIC: [u8; 8] = *b"STYLPRB3";
 const DIGEST: usize = 32;
 /// In finite elements of 2.7 mm the answers of `pelvis` take 380 MB.
 const MOST_BYTES: u64 = 1 << 30;
@@ -117,6 +117,6 @@ fn digest_of(scene: &Scene, shape: &ProbeShape) -> [u8; DIGEST] {
         digest.update([scene.lattice.structure(element)]);
     }
     // Names and materials; no scene holds any that cannot be serialised.
-    digest.update(postcard::to_allocvec(&scene.structures).unwrap_or_default());
+    digest.update(postcard::to_allocvec(&(&scene.structures, &scene.layers)).unwrap_or_default());
     digest.finalize().into()
 }

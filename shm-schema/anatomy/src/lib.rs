@@ -8,5 +8,5 @@ mod tissue;
 
 pub use frame::{PatientFrame, ras_from_lps};
 pub use organ::{Organ, Part, target_among};
-pub use surroundings::{Beyond, Surroundings};
+pub use surroundings::{Beyond, Layer, Surroundings};
 pub use tissue::{Material, Role};

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Medium beyond an outer face of the body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Beyond {
-    /// Soft tissue that the scene omits: it yields like a layer of fat on a fixed base.
+    /// Soft tissue that the scene omits: its layers, of which the outermost is fixed.
     #[default]
     Fat,
     /// Air: skin, or the inside of an empty rectum.
@@ -30,6 +30,35 @@ impl Beyond {
     /// Returns the medium of that name.
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|beyond| beyond.name() == name)
+    }
+}
+
+/// Layer of soft tissue around a body, on the faces that lie on fat.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Layer {
+    /// Thickness, m.
+    pub thickness_m: f64,
+    /// Young's modulus, Pa.
+    pub young_pa: f64,
+}
+
+impl Layer {
+    /// Most layers around a body.
+    pub const MOST: usize = 4;
+    /// Least and largest thickness, m.
+    pub const THICKNESS_M: [f64; 2] = [1e-3, 0.1];
+    /// Least and largest Young's modulus, Pa.
+    pub const YOUNG_PA: [f64; 2] = [100.0, 1e8];
+    /// Fat between the gland and the pelvis, which does not move (assumed).
+    pub const FAT: Self = Self {
+        thickness_m: 20e-3,
+        young_pa: 5e3,
+    };
+
+    /// Returns whether both values are within their limits.
+    pub fn is_valid(&self) -> bool {
+        let within = |value: f64, [least, most]: [f64; 2]| (least..=most).contains(&value);
+        within(self.thickness_m, Self::THICKNESS_M) && within(self.young_pa, Self::YOUNG_PA)
     }
 }
 

@@ -23,6 +23,12 @@ surroundings = "free"
 [[structure]]
 label = 3
 role = "leave out"
+[[layer]]
+thickness_mm = 4
+young_kpa = 40
+[[layer]]
+thickness_mm = 15
+young_kpa = 3
 [needle]
 insert_mm_per_s = 5
 [device]
@@ -51,6 +57,8 @@ fn structures_get_the_materials_of_the_file() {
         (scene.device.as_deref(), scene.retract_m_per_s),
         (Some("simulated"), None)
     );
+    let layers = [(4e-3, 40e3), (15e-3, 3e3)].map(|(thickness_m, young_pa)| Layer { thickness_m, young_pa });
+    assert_eq!(scene.layers, layers);
     let tissues = scene.tissues(&voxels()).unwrap();
     let names: Vec<(&str, Role)> = tissues.iter().map(|t| (t.name.as_str(), t.role)).collect();
     assert_eq!(names, [("Prostate", Role::Target), ("Rectum", Role::Spare)]);
@@ -98,6 +106,9 @@ shear_deg = 90
 [[structure]]
 label = 2
 young_kpa = 0
+[[layer]]
+thickness_mm = 0
+young_kpa = -5
 [needle]
 insert_mm_per_s = 9000
 retract_mm_per_s = nan
@@ -112,6 +123,8 @@ retract_mm_per_s = nan
         "[[structure]] 3: poisson must be",
         "[[structure]] 3: shear_deg must be",
         "[[structure]] 4: young_kpa must be",
+        "[[layer]] 1: thickness_mm must be a number from 1 to 100",
+        "[[layer]] 1: young_kpa must be a number from 0.1 to 100000",
         "[needle] insert_mm_per_s must be a number from 0.1 to 500",
         "[needle] retract_mm_per_s must be a number",
     ] {

@@ -215,6 +215,7 @@ fn a_command_and_a_volume_arrive_and_are_answered_once() {
         dims: [2, 3, 4],
         spacing_m: 1e-3,
         structures: Vec::new(),
+        layers: Vec::new(),
         cells: (0..24).collect(),
         patient: stylet_anatomy::PatientFrame::default(),
         name: "gland".to_owned(),

@@ -72,8 +72,9 @@ impl Control {
 
     pub(super) fn take_volume(&mut self, header: &UploadHeader, cells: &[u8]) {
         let asker: Asker = (header.host_id, header.command_id);
-        let labels = match upload::labels(header, cells) {
-            Ok(labels) => labels,
+        let read = upload::labels(header, cells).and_then(|labels| Ok((labels, upload::layers(header)?)));
+        let (labels, layers) = match read {
+            Ok(both) => both,
             Err(why) => {
                 let refusal = Refusal::new(RefusalCode::InvalidVolume, why.to_string());
                 return self.link.refuse_invalid(asker, &refusal);
@@ -86,10 +87,11 @@ impl Control {
             patient: PatientFrame::of_wire(&header.patient_from_scene),
         };
         let loading = self.load(wanted, move || {
-            let source = SceneSource::of_labels(&name, &labels);
             let scene = Scene::from_labels(&name, &labels)
                 .map_err(|problems| Refusal::new(RefusalCode::InvalidVolume, ProblemList(problems).to_string()))?;
-            Ok((scene, source))
+            let source = SceneSource::of_labels(&name, &labels).in_layers(layers.clone());
+            let source = source.map_err(|why| Refusal::new(RefusalCode::InvalidVolume, why.to_string()))?;
+            Ok((Scene { layers, ..scene }, source))
         });
         if let Err(refusal) = loading {
             self.link.answer(ticket, Err(&refusal));

@@ -2,7 +2,7 @@
 
 use stylet_shm_schema::{MAX_STRUCTURES, ProblemList, UploadHeader, UploadStructure, check, role};
 use stylet_sim::limits::AxisLimits;
-use stylet_sim::scene::{Labels, Material, Role, Structure, Surroundings};
+use stylet_sim::scene::{Labels, Layer, Material, Role, Structure, Surroundings};
 
 /// Problem with the header of an upload.
 #[derive(Debug, thiserror::Error)]
@@ -41,6 +41,17 @@ pub enum UploadProblem {
         /// Whether it has its own limits.
         own_limits: u32,
     },
+    /// A layer that no body has.
+    #[error("layer {number} of {thickness_m} m and {young_pa} Pa must have from {} to {} m and {} to {} Pa",
+        Layer::THICKNESS_M[0], Layer::THICKNESS_M[1], Layer::YOUNG_PA[0], Layer::YOUNG_PA[1])]
+    Layer {
+        /// Its place, from 1.
+        number: usize,
+        /// Its thickness, m.
+        thickness_m: f64,
+        /// Its Young's modulus, Pa.
+        young_pa: f64,
+    },
     /// Surroundings of another version.
     #[error("structure \"{name}\" has surroundings {bits:#x}, which host and core understand differently")]
     Surroundings {
@@ -49,6 +60,22 @@ pub enum UploadProblem {
         /// Its surroundings.
         bits: u32,
     },
+}
+
+/// Returns the layers around the body, or every problem with them; fat where the header has none.
+pub fn layers(header: &UploadHeader) -> Result<Vec<Layer>, ProblemList<UploadProblem>> {
+    let sent = header.layers.iter().take_while(|layer| **layer != [0.0; 2]);
+    let layers: Vec<Layer> = sent
+        .map(|&[thickness_m, young_pa]| Layer { thickness_m, young_pa })
+        .collect();
+    let wrong = layers.iter().zip(1..).filter(|(layer, _)| !layer.is_valid());
+    let problem = |(layer, number): (&Layer, usize)| UploadProblem::Layer {
+        number,
+        thickness_m: layer.thickness_m,
+        young_pa: layer.young_pa,
+    };
+    ProblemList::check(wrong.map(problem).collect())?;
+    Ok(if layers.is_empty() { vec![Layer::FAT] } else { layers })
 }
 
 /// Lists every problem with the header. The scene checks labels, materials and their combination.

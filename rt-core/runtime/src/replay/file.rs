@@ -12,7 +12,7 @@ use stylet_hw::DeviceInfo;
 use stylet_sim::line::LineSource;
 
 /// Ends in the version of the layout.
-const MAGIC: &[u8; 8] = b"STYFLT\0\x12";
+const MAGIC: &[u8; 8] = b"STYFLT\0\x13";
 /// Position of the version.
 const VERSION_AT: usize = MAGIC.len() - 1;
 const DIGEST: usize = 32;

@@ -49,7 +49,7 @@ impl Lattice {
     }
 
     /// Makes one structure of all cells but those of zero.
-    fn of_cells(dims: [usize; 3], spacing_m: f64, cells: &[u8]) -> Self {
+    pub(crate) fn of_cells(dims: [usize; 3], spacing_m: f64, cells: &[u8]) -> Self {
         let [nx, ny, nz] = dims;
         let mut lattice = Lattice {
             dims,

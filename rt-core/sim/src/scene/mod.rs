@@ -24,7 +24,7 @@ pub(crate) use lattice::Run;
 pub use lattice::{Extent, Lattice};
 pub use problem::{SceneError, SceneProblem};
 pub use source::SceneSource;
-pub use structure::{Material, Role, Structure, Surroundings};
+pub use structure::{Layer, Material, Role, Structure, Surroundings};
 pub use stylet_settings::MAX_STRUCTURES;
 pub use surface::{Surface, SurfacePart};
 pub use tissue_kind::TissueKind;
@@ -58,6 +58,8 @@ pub struct Scene {
     pub name: String,
     /// Structures, at least one; elements know theirs by its place here (`Lattice::structure`).
     pub structures: Vec<Structure>,
+    /// Layers around the body, the innermost first; none: springs, as other programs have them (FEM).
+    pub layers: Vec<Layer>,
     /// The labels' cells: what is where in the body at rest. Shared with the tissue model, which would otherwise hold a
     /// copy.
     pub lattice: Arc<Lattice>,
@@ -93,6 +95,7 @@ impl Scene {
         Ok(Scene {
             name: name.to_owned(),
             structures,
+            layers: vec![Layer::FAT],
             nodes: NodeGrid::of(&lattice),
             body: Arc::clone(&lattice),
             lattice,

@@ -1,6 +1,6 @@
 //! Problems of a scene, reported with the value, the limit and the remedy.
 
-use super::{MAX_CELLS_PER_AXIS, MAX_ELEMENTS, MAX_STRUCTURES, SPACING_RANGE_M};
+use super::{Layer, MAX_CELLS_PER_AXIS, MAX_ELEMENTS, MAX_STRUCTURES, SPACING_RANGE_M};
 use stylet_settings::BUILTIN_SCENES;
 
 const MIB: u64 = 1 << 20;
@@ -41,6 +41,12 @@ pub enum SceneProblem {
         /// Edge of a cell, m.
         spacing_m: f64,
     },
+    /// Layers that no body has around it.
+    #[error(
+        "layers around the body: at most {}, of {} to {} m and {} to {} Pa each",
+        Layer::MOST, Layer::THICKNESS_M[0], Layer::THICKNESS_M[1], Layer::YOUNG_PA[0], Layer::YOUNG_PA[1]
+    )]
+    Layers,
     /// No tissue.
     #[error("0 elements, at least 1 needed: all labels are zero; label the tissue with a number other than zero")]
     Empty,

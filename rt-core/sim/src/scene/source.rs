@@ -1,6 +1,6 @@
 //! Source of a scene, small enough to be kept in a recording.
 
-use super::{Labels, Scene, SceneError, Structure};
+use super::{Labels, Layer, Scene, SceneError, SceneProblem, Structure};
 use serde::{Deserialize, Serialize};
 
 /// Source that a scene can be built from again.
@@ -20,6 +20,8 @@ pub enum SceneSource {
         runs: Vec<(u8, u32)>,
         /// Structures as in [`Labels`].
         structures: Vec<Structure>,
+        /// Layers around the body, the innermost first; none: springs.
+        layers: Vec<Layer>,
     },
 }
 
@@ -39,6 +41,30 @@ impl SceneSource {
             spacing_m: labels.spacing_m,
             runs,
             structures: labels.structures.clone(),
+            layers: vec![Layer::FAT],
+        }
+    }
+
+    /// Returns the source of the same scene in other layers.
+    ///
+    /// # Errors
+    ///
+    /// As of [`stiffened`](Self::stiffened).
+    pub fn in_layers(&self, others: Vec<Layer>) -> Result<Self, SceneError> {
+        let mut source = self.in_labels()?;
+        if let Self::Labels { layers, .. } = &mut source {
+            *layers = others;
+        }
+        Ok(source)
+    }
+
+    fn in_labels(&self) -> Result<Self, SceneError> {
+        match self {
+            Self::Builtin(name) => {
+                let labels = super::builtin::labels(name).ok_or_else(|| SceneError::Unknown(name.clone()))?;
+                Ok(Self::of_labels(name, &labels.map_err(SceneError::Invalid)?))
+            }
+            labels => Ok(labels.clone()),
         }
     }
 
@@ -52,13 +78,7 @@ impl SceneSource {
         if factor == 1.0 {
             return Ok(self.clone());
         }
-        let mut source = match self {
-            Self::Builtin(name) => {
-                let labels = super::builtin::labels(name).ok_or_else(|| SceneError::Unknown(name.clone()))?;
-                Self::of_labels(name, &labels.map_err(SceneError::Invalid)?)
-            }
-            labels => labels.clone(),
-        };
+        let mut source = self.in_labels()?;
         if let Self::Labels { structures, .. } = &mut source {
             if structures.is_empty() {
                 structures.push(Structure::soft("tissue", 1));
@@ -84,6 +104,7 @@ impl SceneSource {
                 spacing_m,
                 runs,
                 structures,
+                layers,
             } => {
                 let cells: u64 = runs.iter().map(|(_, count)| u64::from(*count)).sum();
                 let wanted = dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(d as u64));
@@ -100,7 +121,14 @@ impl SceneSource {
                         .collect(),
                     structures: structures.clone(),
                 };
-                Scene::from_labels(name, &labels).map_err(SceneError::Invalid)
+                let scene = Scene::from_labels(name, &labels).map_err(SceneError::Invalid)?;
+                if layers.len() > Layer::MOST || !layers.iter().all(Layer::is_valid) {
+                    return Err(SceneError::Invalid(vec![SceneProblem::Layers]));
+                }
+                Ok(Scene {
+                    layers: layers.clone(),
+                    ..scene
+                })
             }
         }
     }
@@ -156,7 +184,30 @@ mod tests {
             spacing_m,
             runs,
             structures,
+            layers: vec![Layer::FAT],
         };
         assert!(short.build().is_err_and(|why| why.to_string().contains("120")));
+    }
+
+    #[test]
+    fn layers_survive_and_a_wrong_one_is_refused() {
+        let labels = Labels {
+            dims: [4, 5, 6],
+            spacing_m: 1e-3,
+            cells: vec![1; 4 * 5 * 6],
+            structures: Vec::new(),
+        };
+        let muscle = Layer {
+            thickness_m: 5e-3,
+            young_pa: 30e3,
+        };
+        let source = SceneSource::of_labels("block", &labels);
+        let both = vec![muscle, Layer::FAT];
+        assert_eq!(source.in_layers(both.clone()).unwrap().build().unwrap().layers, both);
+        let thin = Layer {
+            thickness_m: 0.0,
+            ..muscle
+        };
+        assert!(source.in_layers(vec![Layer::FAT, thin]).unwrap().build().is_err());
     }
 }

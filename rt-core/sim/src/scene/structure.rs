@@ -2,7 +2,7 @@
 
 use crate::limits::AxisLimits;
 use serde::{Deserialize, Serialize};
-pub use stylet_anatomy::{Role, Surroundings};
+pub use stylet_anatomy::{Layer, Role, Surroundings};
 
 /// One anatomical structure; its cells carry its label.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,13 +1,13 @@
 //! The solver in each number type, compiled in this crate: generic functions are compiled again by every crate that
 //! calls them, which takes a while where they step or build a body.
 
-use super::batch::{BatchModel, BatchState, Progress};
+use super::batch::{BatchModel, BatchState, Progress, condensed};
 use super::material::{FemProblem, FemSettings};
 use super::model::FemModel;
 use super::real::Real;
 use super::solve::{self, FemReport, SolveSettings};
 use super::state::FemState;
-use crate::scene::Lattice;
+use crate::scene::{Lattice, Layer};
 use crate::tissue::Held;
 use std::sync::Arc;
 use stylet_settings::ProblemList;
@@ -55,7 +55,13 @@ compiled! {
         next: Option<Held>,
         settings: &SolveSettings
     ) -> () = solve::prepare_next;
-    fn batch_model(model: &FemModel<Self>) -> BatchModel<Self> = BatchModel::of_model;
+    fn layered(
+        lattice: &Lattice,
+        of: &Arc<Lattice>,
+        settings: &FemSettings,
+        layers: &[Layer]
+    ) -> Result<FemModel<Self>, ProblemList<FemProblem>> = FemModel::of_layered;
+    fn batch_model(model: &FemModel<Self>) -> BatchModel<Self> = condensed;
     fn advance(state: &mut BatchState<Self>, model: &BatchModel<Self>) -> Progress = BatchState::do_slice;
 }
 
@@ -82,6 +88,17 @@ impl<T: Compiled> FemModel<T> {
         settings: &FemSettings,
     ) -> Result<Self, ProblemList<FemProblem>> {
         T::model(lattice, of, settings, &|_| false)
+    }
+
+    /// Makes the same in layers, the innermost first, whose outside is fixed. They lie on the faces that rest on fat; if
+    /// there are none, springs of `foundation_pa_per_m` do.
+    pub fn in_layers(
+        lattice: &Lattice,
+        of: &Arc<Lattice>,
+        settings: &FemSettings,
+        layers: &[Layer],
+    ) -> Result<Self, ProblemList<FemProblem>> {
+        T::layered(lattice, of, settings, layers)
     }
 }
 

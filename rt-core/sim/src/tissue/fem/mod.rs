@@ -16,7 +16,9 @@
 //! costly one, unless idle ticks before have prepared the patch (`prepare`).
 //!
 //! *Foundation.* The surroundings are springs to rest on all free faces (`foundation_pa_per_m`) and fixed structures. A
-//! part of the body that has neither stays at rest unless it is held.
+//! part of the body that has neither stays at rest unless it is held. Around a scene lie layers (`shell`): their springs
+//! have the layers' mean stiffness against translation, and the columns of `batch` meet their own stiffness against each
+//! displacement of the surface that is a polynomial of second degree.
 //!
 //! ```
 //! use stylet_sim::scene::Scene;
@@ -53,7 +55,9 @@ mod memory;
 mod model;
 mod multigrid;
 mod output;
+mod reaction;
 mod real;
+mod shell;
 mod smooth;
 mod solve;
 mod state;

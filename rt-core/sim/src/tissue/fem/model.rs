@@ -5,6 +5,7 @@ use super::hexahedron::Stiffness;
 use super::level::Level;
 use super::levels::{Cells, coarser, levels};
 use super::material::{FemProblem, FemSettings, Structure, problems_of};
+use super::reaction::Reaction;
 use super::real::Real;
 use crate::scene::Lattice;
 use std::sync::Arc;
@@ -36,6 +37,8 @@ pub struct FemModel<T = f32> {
     pub(super) part: Vec<u32>,
     /// Nodes of the parts that neither springs nor fixed nodes keep in place.
     pub(super) loose: Vec<Vec<u32>>,
+    /// Forces of the layers around the body beyond those of its springs.
+    pub(super) reactions: Vec<Reaction>,
 }
 
 impl<T: Real> FemModel<T> {
@@ -69,19 +72,31 @@ impl<T: Real> FemModel<T> {
             is_cell: body.is_cell,
             part,
             loose,
+            reactions: Vec::new(),
         })
     }
 
     /// Returns whether springs or something fixed hold the part of the body that an element belongs to.
     pub fn is_held(&self, element: u32) -> bool {
+        let part = self.part_of_element(element);
+        let is_it = |node: &u32| self.part.get(*node as usize) == Some(&part);
+        !self.loose.iter().any(|nodes| nodes.first().is_some_and(is_it))
+    }
+
+    /// Returns the part of the body that an element belongs to.
+    pub(super) fn part_of_element(&self, element: u32) -> u32 {
         let cell = self.lattice.cell(element);
         let place = [0, 1, 2].map(|a| cell[a].saturating_sub(self.low_cell[a]));
-        let part_of = |node: usize| self.part.get(node).copied().unwrap_or(NO_PART);
-        let part = part_of(self.levels[0].grid.index(place));
-        !self
-            .loose
-            .iter()
-            .any(|nodes| nodes.first().is_some_and(|&node| part_of(node as usize) == part))
+        self.part
+            .get(self.levels[0].grid.index(place))
+            .copied()
+            .unwrap_or(NO_PART)
+    }
+
+    /// Returns whether a node of a part of the body is fixed.
+    pub(super) fn is_fixed_somewhere(&self, part: u32) -> bool {
+        let mut nodes = self.part.iter().zip(&self.levels[0].inverse_diagonal);
+        nodes.any(|(of, inverse)| *of == part && *inverse == T::ZERO)
     }
 
     /// Returns the elements and their neighbours.

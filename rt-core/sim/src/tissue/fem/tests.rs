@@ -12,6 +12,7 @@ use crate::tissue::{Held, HeldOutcome};
 mod ahead;
 mod coarser;
 mod golden;
+mod layers;
 mod locking;
 mod memory;
 mod operator;

@@ -11,8 +11,8 @@ use crate::tissue::{
 };
 use stylet_settings::ProblemList;
 
-/// Stiffness of the surroundings of a body: 20 mm of fat of 5 kPa, per surface area (assumed).
-pub const SURROUNDINGS_PA_PER_M: f64 = 5e3 / 20e-3;
+/// Springs of a body without layers: the modulus of 20 mm of fat over their thickness, as the second methods have it.
+const SPRINGS_PA_PER_M: f64 = 5e3 / 20e-3;
 
 /// Cycles in one tick. Two fit into 5 ms on the paper's gland only just; what is left is done in the ticks before,
 /// ahead of the tip, and in those after.
@@ -33,7 +33,7 @@ pub struct FemTissue<T = f32> {
 }
 
 impl<T: Compiled> FemTissue<T> {
-    /// Makes the scene's materials in its surroundings, solved as far as the loop has time for.
+    /// Makes the scene's materials in its layers, solved as far as the loop has time for.
     pub fn new(scene: &Scene) -> Result<Self, ProblemList<FemProblem>> {
         let structures = scene.structures.iter().map(|s| match s.material.fixed {
             true => Structure::Fixed,
@@ -46,10 +46,10 @@ impl<T: Compiled> FemTissue<T> {
         let settings = FemSettings {
             structures: structures.collect(),
             structure_of: scene.lattice.structures().to_vec(),
-            foundation_pa_per_m: SURROUNDINGS_PA_PER_M,
+            foundation_pa_per_m: SPRINGS_PA_PER_M,
             surroundings: scene.structures.iter().map(|s| s.material.surroundings).collect(),
         };
-        let model = FemModel::coarser(&scene.lattice, &scene.body, &settings)?;
+        let model = FemModel::in_layers(&scene.lattice, &scene.body, &settings, &scene.layers)?;
         Ok(FemTissue {
             state: FemState::at_rest(&model),
             large: LargeStrain::new(scene),

@@ -2,6 +2,7 @@
 
 use super::LOADS;
 use super::kernel::{nothing, product};
+use super::support::Support;
 use crate::scene::Lattice;
 use crate::simd::Simd;
 use crate::tissue::fem::level::Level;
@@ -12,15 +13,6 @@ use std::sync::Arc;
 
 /// A grid place that no element touches.
 pub(super) const NO_NODE: u32 = u32::MAX;
-
-/// Weight with which a load acts on a node, or with which the node is read.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NodeWeight {
-    /// Number of the node.
-    pub node: u32,
-    /// Weight along x, y, z.
-    pub weight: [f64; 3],
-}
 
 /// Neighbouring elements along x: their nodes are consecutive in each of the four lines around them.
 #[derive(Clone, Copy, Debug)]
@@ -82,6 +74,8 @@ pub struct BatchModel<T = f32> {
     /// Number of the part of each node of the finest level.
     pub(super) part_of_node: Vec<u32>,
     pub(super) parts: Vec<Part>,
+    /// Layers around the body.
+    pub(super) supports: Vec<Support<T>>,
     /// Shear modulus and Poisson's ratio of each element; zero where it is rigid.
     materials: Vec<[f32; 2]>,
     low_m: [f64; 3],
@@ -90,7 +84,7 @@ pub struct BatchModel<T = f32> {
 }
 
 impl<T: Real> BatchModel<T> {
-    pub(in super::super) fn of_model(model: &FemModel<T>) -> Self {
+    pub(super) fn of_model(model: &FemModel<T>) -> Self {
         let mut levels: Vec<BatchLevel<T>> = model.levels.iter().map(compact).collect();
         for &node in model.loose.iter().flatten() {
             let at = levels[0].node_at[node as usize] as usize;
@@ -130,6 +124,7 @@ impl<T: Real> BatchModel<T> {
             lattice: model.lattice.clone(),
             part_of_node: Vec::new(),
             parts: Vec::new(),
+            supports: Vec::new(),
             materials: model
                 .runs
                 .iter()
@@ -215,7 +210,9 @@ impl<T: Real> BatchModel<T> {
                 + l.stiffness.len() * size_of::<[T; 3]>()
                 + 4 * (l.parents.len() + l.node_at.len())
         };
-        self.levels.iter().map(level).sum::<usize>() + self.coarsest.len() * size_of::<T>() + 16 * self.corners.len()
+        let of_layers = self.supports.iter().map(Support::bytes).sum::<usize>();
+        let of_body = self.levels.iter().map(level).sum::<usize>() + self.coarsest.len() * size_of::<T>();
+        of_layers + of_body + 16 * self.corners.len()
     }
 
     /// Computes the pseudo-inverse of the coarsest level, so that a part without stiffness stays where it is.

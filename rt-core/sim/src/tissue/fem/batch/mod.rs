@@ -9,20 +9,32 @@
 //! [`advance`](BatchState::advance) does one pass over one level and returns, so that idle ticks can prepare columns in
 //! slices.
 
+mod condensed;
 mod cycle;
 mod kernel;
 mod level;
 mod output;
 mod parts;
 mod solve;
+mod support;
 
-pub use level::{BatchModel, NodeWeight, Part};
+pub(super) use condensed::{condensed, held_forces_n};
+pub use level::{BatchModel, Part};
 pub use solve::{BatchState, Progress};
 
 use crate::simd::{Eight, LANES};
 
 /// Number of loads that are solved at once.
 pub const LOADS: usize = LANES;
+
+/// Weight with which a load acts on a node, or with which the node is read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NodeWeight {
+    /// Number of the node.
+    pub node: u32,
+    /// Weight along x, y, z.
+    pub weight: [f64; 3],
+}
 
 /// x, y, z of a node, each for every load.
 type Node<T> = [Eight<T>; 3];

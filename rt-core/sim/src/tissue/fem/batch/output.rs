@@ -1,6 +1,7 @@
 //! Output of an answer: displacements of element centres, values under weights, and the force of the foundation.
 
-use super::level::{BatchModel, NodeWeight};
+use super::NodeWeight;
+use super::level::BatchModel;
 use super::solve::BatchState;
 use crate::tissue::ElementField;
 use crate::tissue::fem::real::Real;
@@ -15,9 +16,9 @@ impl<T: Real> BatchState<T> {
         weights.iter().filter_map(at).sum()
     }
 
-    /// Returns the force of the foundation on the body, N: that of the springs to rest.
+    /// Returns the force of the foundation on the body, N: that of the springs to rest and of the layers.
     pub fn foundation_n(&self, model: &BatchModel<T>, load: usize) -> [f64; 3] {
-        let mut force = [0.0; 3];
+        let mut force = self.of_layers_n.get(load).copied().unwrap_or_default();
         for (u, &spring) in self.u.iter().zip(&model.levels[0].springs) {
             for c in 0..3 {
                 force[c] -= spring.to_f64() * u[c].0[load].to_f64();

@@ -42,5 +42,10 @@ impl<T: Real> BatchModel<T> {
                 part.m_per_n = 1.0 / springs_n_per_m;
             }
         }
+        for reaction in &model.reactions {
+            if let Some(part) = self.parts.get_mut(reaction.part as usize) {
+                part.m_per_n = reaction.whole_m_per_n;
+            }
+        }
     }
 }

@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use super::cycle::{Stage, prolong, restrict, smooth, smooth_down, solve_coarsest};
 use super::kernel::{PlaneOp, TwoPlanes, answer, nothing, sweep};
-use super::level::{BatchModel, NodeWeight};
-use super::{LOADS, Node};
+use super::level::BatchModel;
+use super::support::OfLayers;
+use super::{LOADS, Node, NodeWeight};
 use crate::simd::{Eight, Vector, in_vectors};
 use crate::tissue::fem::real::Real;
 
@@ -44,6 +45,7 @@ pub struct BatchState<T = f32> {
     slices: Vec<Slice>,
     next: usize,
     load: [f64; LOADS],
+    pub(super) of_layers_n: OfLayers,
     rz: [f64; LOADS],
     alpha: [f64; LOADS],
     residuals: [f64; LOADS],
@@ -71,6 +73,7 @@ impl<T: Real> BatchState<T> {
             slices,
             next: 0,
             load: [0.0; LOADS],
+            of_layers_n: OfLayers::default(),
             rz: [0.0; LOADS],
             alpha: [0.0; LOADS],
             residuals: [0.0; LOADS],
@@ -91,6 +94,7 @@ impl<T: Real> BatchState<T> {
 
     /// Begins at most eight loads; those past the eighth are ignored, as are nodes that do not move.
     pub fn begin(&mut self, model: &BatchModel<T>, loads: &[&[NodeWeight]]) {
+        self.of_layers_n = OfLayers::default();
         let r = &mut self.stages[0].b;
         for field in [&mut self.u, &mut *r, &mut self.p, &mut self.q] {
             field.fill(nothing());
@@ -101,6 +105,16 @@ impl<T: Real> BatchState<T> {
                     value.0[lane] += T::of(weight);
                 }
             }
+            let mut sum = [0.0; 3];
+            for support in &model.supports {
+                let on_part = support.react(load, |node, force_n| {
+                    if let Some(r) = r.get_mut(node as usize) {
+                        (0..3).for_each(|c| r[c].0[lane] += T::of(force_n[c]));
+                    }
+                });
+                (0..3).for_each(|c| sum[c] += on_part[c]);
+            }
+            self.of_layers_n[lane] = sum;
         }
         self.load = dots(model.levels[0].simd, &*r, [&*r, &*r])[0].map(f64::sqrt);
         self.residuals = self.load;
