@@ -1,6 +1,7 @@
 //! Layers around a body, against the same layers in cells of the body's size (`tests/oracles/gland_in_layers.py`).
 
 use super::*;
+use crate::scene::{Layer, Role, TissueKind};
 use crate::tissue::ElementField;
 use crate::tissue::fem::batch::{BatchModel, BatchState, NodeWeight};
 
@@ -154,4 +155,51 @@ fn a_part_beside_a_loaded_one_stays_at_rest() {
     let [near, far] = [12e-3, 36e-3].map(moved);
     // As the solver leaves it, on springs as well.
     assert!(near > 1e-4 && far < 1e-3 * near, "{near} {far}");
+}
+
+/// Measures what layers cost and do, with springs beside them: `cargo test --profile quick -p stylet-sim --lib
+/// what_layers_cost -- --ignored --nocapture`
+#[test]
+#[ignore = "a measurement of a minute"]
+fn what_layers_cost_and_do_in_paper_and_pelvis() {
+    for name in ["paper", "pelvis"] {
+        let scene = Scene::builtin(name).expect("built in").for_tissue(TissueKind::Fem);
+        for layers in [vec![], vec![Layer::FAT]] {
+            let is_layered = !layers.is_empty();
+            let scene = Scene {
+                layers,
+                ..scene.clone()
+            };
+            let seconds = |begun: std::time::Instant| begun.elapsed().as_secs_f64();
+            let begun = std::time::Instant::now();
+            let model = FemTissue::<f32>::new(&scene).expect("valid").model;
+            let made_s = seconds(begun);
+            let begun = std::time::Instant::now();
+            let body = BatchModel::new(&model);
+            let condensed_s = seconds(begun);
+            let (low, high) = scene.target_bounds_m();
+            let middle_m = [0, 1, 2].map(|a| 0.5 * (low[a] + high[a]));
+            let mut state = BatchState::new(&body);
+            let mut field = ElementField::zeros(body.element_count());
+            let mut means = [0.0; 3];
+            for (axis, mean) in means.iter_mut().enumerate() {
+                let load = body.trilinear(middle_m).expect("in the gland").map(|(node, part)| {
+                    let weight = [0, 1, 2].map(|a| if a == axis { part } else { 0.0 });
+                    NodeWeight { node, weight }
+                });
+                state.begin(&body, &[&load]);
+                state.solve(&body, 1e-3, 200);
+                state.write(&body, 0, &mut field);
+                let is_target = |e: &u32| scene.structures[usize::from(scene.body.structure(*e))].role == Role::Target;
+                let targets: Vec<u32> = (0..scene.body.element_count() as u32).filter(is_target).collect();
+                let sum: f64 = targets.iter().map(|e| f64::from(field.0[axis][*e as usize])).sum();
+                *mean = 1e3 * sum / targets.len() as f64;
+            }
+            let springs: f64 = model.levels[0].springs.iter().map(|s| f64::from(*s)).sum();
+            println!(
+                "{name}, layers {is_layered}: made in {made_s:.2} s, condensed in {condensed_s:.2} s, {:.1} MB, springs {springs:.0} N/m, gland moves by {means:.4?} mm/N along x, y, z",
+                body.bytes() as f64 / 1e6
+            );
+        }
+    }
 }
