@@ -68,3 +68,6 @@ impl<T: Real> FemModel<T> {
         Ok(model)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -9,9 +9,9 @@ use stylet_anatomy::Beyond;
 /// Cubes for the layers, by their volume; more are made twice as large.
 const MOST_CUBES: f64 = 100_000.0;
 /// Cells of the body, empty cells, and fixed cells beyond the layers; numbers between are those of layers.
-const BODY: u8 = u8::MAX;
+pub(super) const BODY: u8 = u8::MAX;
 const EMPTY: u8 = u8::MAX - 1;
-const BEYOND: u8 = 0;
+pub(super) const BEYOND: u8 = 0;
 
 fn is_layer(kind: u8) -> bool {
     (1..EMPTY).contains(&kind)
@@ -23,9 +23,9 @@ pub(super) struct Cubes {
     pub edge_m: f64,
     /// Place of the lowest corner in the scene frame.
     pub low_m: [f64; 3],
-    kinds: Vec<u8>,
+    pub kinds: Vec<u8>,
     /// An element of the body in each cube of it.
-    element: Vec<u32>,
+    pub element: Vec<u32>,
 }
 
 impl Cubes {
@@ -128,7 +128,7 @@ impl Cubes {
     }
 
     /// Returns the cubes around a corner.
-    fn around_corner(&self, corner: [usize; 3]) -> impl Iterator<Item = usize> + '_ {
+    pub fn around_corner(&self, corner: [usize; 3]) -> impl Iterator<Item = usize> + '_ {
         (0..8).filter_map(move |n| {
             let place = [0, 1, 2].map(|a| (corner[a] + (n >> a & 1)).wrapping_sub(1));
             (0..3).all(|a| place[a] < self.dims[a]).then(|| self.index(place))
