@@ -109,7 +109,7 @@ fn layers_answer_reciprocally_and_carry_the_load() {
             let [there, back] = [state.sample(a, &loads[b]), state.sample(b, &loads[a])];
             let own = (state.sample(a, &loads[a]) * state.sample(b, &loads[b])).sqrt();
             println!("{a} and {b}: {there:.4e} and {back:.4e} of {own:.4e} m/N");
-            assert!((there - back).abs() < 1e-3 * own, "{there} {back} of {own}");
+            assert!((there - back).abs() < 2e-5 * own, "{there} {back} of {own}");
         }
         let carried = state.foundation_n(&body, a)[if a == 2 { 1 } else { 2 }];
         println!("{a}: carried {carried:.5} N");
