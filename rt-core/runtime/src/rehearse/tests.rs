@@ -289,15 +289,18 @@ fn seeds_rest_at_any_speed(tissue: TissueKind) {
             assert!(off.norm() < 15e-3, "{off:?}");
         }
     }
-    // The hand turns up to 0.6 mm beyond its goal, by its speed; a seed in stretched tissue follows that.
+    // The hand turns up to 0.6 mm beyond its goal, by its speed; a seed in stretched tissue follows that, one in tissue that
+    // sticks does not.
     let apart_m = |a: &[(SeedPose, f64)], b: &[(SeedPose, f64)]| {
-        let pairs = a.iter().zip(b);
-        let apart = pairs.map(|((a, at_m), (b, bt_m))| ((a.position_m[2] - at_m) - (b.position_m[2] - bt_m)).abs());
+        let apart = a.iter().zip(b).map(|((a, at_m), (b, bt_m))| {
+            let (seed_m, turn_m) = (a.position_m[2] - b.position_m[2], at_m - bt_m);
+            (seed_m - seed_m.clamp(turn_m.min(0.0), turn_m.max(0.0))).abs()
+        });
         apart.fold(0.0, f64::max)
     };
     let [slow, _, usual, fast] = runs.each_ref().map(|(_, run)| run);
     assert!(apart_m(usual, fast) < 0.2e-3, "{} m", apart_m(usual, fast));
-    assert!(apart_m(usual, slow) < 1.5e-3, "{} m", apart_m(usual, slow));
+    assert!(apart_m(usual, slow) < 0.2e-3, "{} m", apart_m(usual, slow));
 }
 
 /// The line restarted at the tip's depth and pushed the needle out at once.

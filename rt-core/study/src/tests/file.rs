@@ -37,7 +37,7 @@ retract_mm_per_s = { uniform = [1.0, 1000.0] }
 hand_mass_kg = "heavy"
 entry_right_mm = { normal = [5.0, 1.0], within = [-1.0, 1.0] }
 "needle.depth_coefficient" = 100.0
-"force.cutting" = -1.0
+"layers.gland_toughness" = -1.0
 "#;
     let problems = study_in(folder.path(), wrong).expect_err("it is wrong all over");
     let expected = [
@@ -53,7 +53,7 @@ entry_right_mm = { normal = [5.0, 1.0], within = [-1.0, 1.0] }
         "vary.hand_mass_kg: give a number, { uniform",
         "vary.entry_right_mm: the middle is 5, outside of within = [-1, 1]",
         "vary.needle.depth_coefficient: it does nothing in tissue",
-        "vary.force.cutting: it reaches from -1 to -1; the limits are 0 to 10",
+        "vary.layers.gland_toughness: it reaches from -1 to -1; the limits are 0 to 5000",
     ];
     for start in expected {
         assert!(
@@ -92,8 +92,7 @@ fn a_key_or_type_that_no_study_has_is_refused_with_its_line() {
 #[test]
 fn parameters_that_the_device_does_not_hold_together_are_refused_with_their_values() {
     let folder = tempfile::tempdir().unwrap();
-    let keys =
-        "[vary]\n\"force.membrane_peak\" = { uniform = [4.0, 9.0] }\n\"force.cutting\" = { uniform = [1.0, 2.0] }";
+    let keys = "[vary]\n\"force.membrane_peak\" = { uniform = [4.0, 9.0] }";
     let problems = study_in(folder.path(), &(text("implants = 1") + keys)).expect_err("refused");
     assert_eq!(problems.len(), 1, "{problems:#?}");
     assert!(
@@ -222,7 +221,10 @@ fn a_quantity_that_is_added_moves_no_other() {
     let folder = tempfile::tempdir().unwrap();
     let (few, more) = (
         varied(folder.path(), ""),
-        varied(folder.path(), "\"force.cutting\" = { uniform = [1.0, 2.0] }\n"),
+        varied(
+            folder.path(),
+            "\"layers.gland_toughness\" = { uniform = [100.0, 200.0] }\n",
+        ),
     );
     let of = |study: &Study| Drawn::of(study, Implant::at(study, 17), 1).values;
     let (few, more) = (of(&few), of(&more));
