@@ -220,6 +220,10 @@ impl<T: Real> BatchModel<T> {
         let level = &self.levels[self.levels.len() - 1];
         let free = (0..level.node_count as u32).filter(|&n| level.inverse_diagonal[n as usize] != T::ZERO);
         self.coarsest_nodes = free.collect();
+        if self.coarsest_nodes.is_empty() {
+            // Layers thinner than the coarsest cells: those correct nothing.
+            return;
+        }
         let size = 3 * self.coarsest_nodes.len();
         let mut matrix = nalgebra::DMatrix::<f64>::zeros(size, size);
         let nodes = &self.coarsest_nodes;

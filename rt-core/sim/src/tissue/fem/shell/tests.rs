@@ -4,6 +4,7 @@ use super::cubes::{BEYOND, BODY};
 use super::*;
 use crate::scene::{Labels, Material, Role, Scene, Structure, Surroundings, TissueKind};
 use crate::tissue::ElementField;
+use crate::tissue::fem::FemTissue;
 use crate::tissue::fem::batch::{BatchModel, BatchState, NodeWeight, condensed};
 use crate::tissue::fem::material::{Integration, Structure as Elastic};
 use stylet_anatomy::Beyond;
@@ -144,6 +145,17 @@ fn two_layers_on_five_sides_of_a_block_move_it_as_their_cells_do() {
     };
     let off = off_by("block", &scene);
     assert!(off < 0.02, "{off}");
+}
+
+/// `full` did not start: its layers are thinner than the cells of its coarsest grid, which has no free node.
+#[test]
+fn every_built_in_scene_has_its_layers() {
+    for name in ["paper", "pelvis", "full"] {
+        let scene = Scene::builtin(name).expect("built in").for_lines(TissueKind::ChainMail);
+        let body = FemTissue::<f32>::new(&scene.expect("has lines")).expect("valid");
+        let springs: f64 = body.model.levels[0].springs.iter().map(|s| s.to_f64()).sum();
+        assert!(springs > 0.0, "{name}");
+    }
 }
 
 /// Measures what springs do to a body that bone holds: `cargo test --profile quick -p stylet-sim --lib pelvis_in_its_layers
