@@ -32,6 +32,9 @@ const SHORTEST_WINDOW_NS: u64 = 100_000_000;
 /// Below both loops, above everything of normal priority.
 const WATCH_PRIORITY_BELOW_TISSUE: u32 = 10;
 
+/// Name of the force loop's thread.
+const FORCE_THREAD: &str = "haptic";
+
 /// Settings of a run.
 pub struct Setup<'a> {
     pub options: &'a Options,
@@ -217,12 +220,13 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         [options.haptic_core, options.tissue_core, second_core],
     );
     let stop = Arc::new(AtomicBool::new(false));
+    let before = others::before(&machine);
     let mut load = Running::start(setup.load, &options.instance, setup.folder)?;
     let traced = setup.trace_over_ns.zip(options.haptic_core);
     let tracing = traced.map(|(over_ns, core)| Watched {
         machine: &machine,
         core,
-        thread: "haptic",
+        thread: FORCE_THREAD,
         priority: (!options.no_rt).then_some(options.haptic_priority),
         over_ns,
     });
@@ -259,8 +263,13 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         let second = second.map(|(timing, ring)| threads.spawn(move || timing.gather(ring)));
         let gaps = threads.spawn(move || gaps::watch(core, priority, stop));
         let machine = &machine;
-        let rank = if options.no_rt { 1 } else { options.haptic_priority };
-        let others = threads.spawn(move || others::watch(machine, options.haptic_core, rank, core, stop));
+        let looked_at = others::Watched {
+            core: options.haptic_core,
+            priority: if options.no_rt { 1 } else { options.haptic_priority },
+            thread: FORCE_THREAD,
+            from_core: core,
+        };
+        let others = threads.spawn(move || others::watch(machine, looked_at, before, stop));
         let cores: Vec<_> = watched
             .into_iter()
             .flatten()
@@ -269,7 +278,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         let run = process::run_with(options, Some(probes), stop);
         stop.store(true, Ordering::Release);
         let cores: Vec<CoreWatch> = cores.into_iter().filter_map(|t| t.join().ok()).collect();
-        let others = others.join().unwrap_or_default();
+        let others = others.join();
         let (haptic, tissue) = (haptic.join(), tissue.join());
         let second = second.map(|thread| thread.join());
         // It ends when the force loop's gathering ends.
@@ -286,6 +295,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
             second,
         )
     });
+    let others = others.map(|looked| others::after(&machine, looked));
     // A window that could not open draws nothing.
     let loaded = load.ended();
     drop(load);
@@ -302,7 +312,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         host: host.map_err(panicked)??,
         gaps: gaps.map_err(panicked)?,
         cores,
-        others,
+        others: others.map_err(panicked)?,
         trace: trace.transpose().map_err(panicked)?,
         window_ns,
         began_s,

@@ -12,9 +12,12 @@ use stylet_runtime::rt::clock;
 const NOTABLE: f64 = 0.02;
 /// Most threads that are listed.
 const LISTED: usize = 12;
-/// Interval of looks at real-time threads, and of searches for new ones.
+/// Interval of looks at real-time threads, and of searches for new ones: a search reads all of `/proc`.
 const LOOK: Duration = Duration::from_millis(100);
-const LOOKS_TO_A_SEARCH: u32 = 5;
+const LOOKS_TO_A_SEARCH: u32 = 20;
+/// Wait of the loop for its core in one look, from which new ones are searched for sooner.
+const LONG_WAIT_NS: u64 = 1_000_000;
+const FEWEST_LOOKS: u32 = 5;
 /// Most intervals in which a rival ran.
 const KEPT: usize = 4096;
 /// Programs of Stylet that serve an instance.
@@ -53,9 +56,22 @@ pub struct Others {
     pub threads: Vec<OtherThread>,
     /// Other programs of Stylet.
     pub instances: Vec<String>,
-    /// Begin, end, and what threads that preempt the loop ran in between, ns.
     #[serde(skip)]
-    rivals: Vec<(u64, u64, String, u64)>,
+    rivals: Vec<Rival>,
+    /// The last state of each thread, also of those that end during the run.
+    #[serde(skip)]
+    seen: BTreeMap<u32, StatOfThread>,
+}
+
+/// What a thread that preempts the loop ran between two looks, ns.
+#[derive(Clone, Debug)]
+struct Rival {
+    begin_ns: u64,
+    end_ns: u64,
+    who: String,
+    ran_ns: u64,
+    /// Wait of the loop for its core in the same time; `None` if the kernel does not count it.
+    loop_waited_ns: Option<u64>,
 }
 
 impl Others {
@@ -75,55 +91,81 @@ impl Others {
     }
 
     /// Returns the thread of the loop's priority or a higher one that ran while a tick was late, for long enough to be
-    /// its cause.
+    /// its cause, if the loop waited for its core as long.
     pub fn rival(&self, from_ns: u64, to_ns: u64) -> Option<String> {
-        let overlap = self
-            .rivals
-            .iter()
-            .filter(|(begin, end, ..)| *begin < to_ns && *end > from_ns);
-        let (begin_ns, end_ns, who, ran_ns) = overlap.max_by_key(|(.., ran)| *ran)?;
-        (2 * ran_ns >= to_ns - from_ns).then(|| {
-            let [ran, around] = [*ran_ns, end_ns - begin_ns].map(|ns| ns as f64 / 1e6);
-            format!("{who} ran {ran:.1} ms on this core, of the {around:.0} ms around the tick")
+        let overlap = self.rivals.iter().filter(|r| r.begin_ns < to_ns && r.end_ns > from_ns);
+        let rival = overlap.max_by_key(|r| r.ran_ns)?;
+        let lasted_ns = rival.ran_ns.min(rival.loop_waited_ns.unwrap_or(u64::MAX));
+        (2 * lasted_ns >= to_ns - from_ns).then(|| {
+            let [ran, around] = [rival.ran_ns, rival.end_ns - rival.begin_ns].map(|ns| ns as f64 / 1e6);
+            format!(
+                "{} ran {ran:.1} ms on this core, of the {around:.0} ms around the tick",
+                rival.who
+            )
         })
     }
 }
 
-/// Looks on from `from_core` until `stop`; a thread with `priority` or more rivals the loop on `core`.
-pub fn watch(
-    machine: &Machine,
-    core: Option<usize>,
-    priority: u32,
-    from_core: Option<usize>,
-    stop: &AtomicBool,
-) -> Others {
+/// The loop that is watched, and the core from which it is.
+#[derive(Clone, Copy)]
+pub struct Watched {
+    pub core: Option<usize>,
+    /// A thread with this priority or more rivals the loop.
+    pub priority: u32,
+    /// Name of its thread.
+    pub thread: &'static str,
+    pub from_core: Option<usize>,
+}
+
+/// The state of the PC before a measurement.
+pub struct Before {
+    moment: Moment,
+    begin_ns: u64,
+    threads: BTreeMap<u32, StatOfThread>,
+}
+
+/// Searches all threads; not while the loops run.
+pub fn before(machine: &Machine) -> Before {
+    Before {
+        moment: moment(machine, "before"),
+        begin_ns: clock::now_ns(),
+        threads: foreign(machine),
+    }
+}
+
+/// Looks on until `stop`, whenever no other thread needs the core.
+pub fn watch(machine: &Machine, watched: Watched, before: Before, stop: &AtomicBool) -> (Before, Others) {
     let _armed = arm::arm(Ask {
         priority: None,
-        core: from_core,
+        core: watched.from_core,
     });
+    arm::give_way();
     let mut others = Others {
-        moments: vec![moment(machine, "before")],
+        moments: vec![before.moment.clone()],
         ..Others::default()
     };
-    let begin_ns = clock::now_ns();
-    let before = foreign(machine);
     let rivals_of = |all: &BTreeMap<u32, StatOfThread>| -> Vec<StatOfThread> {
-        let rivals = all.values().filter(|t| t.priority.is_some_and(|p| p >= priority));
-        rivals.filter(|t| Some(t.core) == core).cloned().collect()
+        let rivals = all
+            .values()
+            .filter(|t| t.priority.is_some_and(|p| p >= watched.priority));
+        rivals.filter(|t| Some(t.core) == watched.core).cloned().collect()
     };
-    let mut rivals = rivals_of(&before);
-    // The last state of each thread, also of those that end during the run.
-    let mut seen: BTreeMap<u32, StatOfThread> = BTreeMap::new();
+    let own = std::process::id();
+    let (mut own_thread, mut waited_before) = (None, None);
+    let mut rivals = rivals_of(&before.threads);
     let mut ran: BTreeMap<u32, u64> = rivals.iter().map(|t| (t.id, t.ran_ns)).collect();
-    let (mut looks, mut last_ns) = (0, begin_ns);
-    // A thread that a search finds for the first time may have run since the search before.
-    let (mut known, mut searched_ns) = (before.clone(), begin_ns);
+    let (mut looks, mut since_search, mut last_ns) = (0, 0, before.begin_ns);
+    let mut known = before.threads.clone();
     // SYNC: nothing but the flag is carried.
     while !stop.load(Ordering::Acquire) {
         std::thread::sleep(LOOK);
-        looks += 1;
-        let is_search = looks % LOOKS_TO_A_SEARCH == 0;
-        let found = is_search.then(|| foreign(machine));
+        (looks, since_search) = (looks + 1, since_search + 1);
+        own_thread = own_thread.or_else(|| machine.own_thread(watched.thread));
+        let waited = own_thread.and_then(|id| machine.waited_ns(own, id));
+        let loop_waited_ns = waited.zip(waited_before).map(|(now, before)| now - before);
+        waited_before = waited;
+        let is_late = since_search >= FEWEST_LOOKS && loop_waited_ns.is_some_and(|ns| ns >= LONG_WAIT_NS);
+        let found = (is_late || since_search == LOOKS_TO_A_SEARCH).then(|| foreign(machine));
         if let Some(found) = &found {
             rivals = rivals_of(found);
         }
@@ -132,33 +174,44 @@ pub fn watch(
             let Some(now) = machine.ran_ns(rival.process, rival.id) else {
                 continue;
             };
-            let earlier = ran.insert(rival.id, now);
-            let begin_ns = if earlier.is_some() { last_ns } else { searched_ns };
+            // One that a search finds for the first time may have run since the search before.
             let at_search = || known.get(&rival.id).map_or(0, |t| t.ran_ns);
-            let since = now.saturating_sub(earlier.unwrap_or_else(at_search));
-            if since > 0 && others.rivals.len() < KEPT {
+            let ran_ns = now.saturating_sub(ran.insert(rival.id, now).unwrap_or_else(at_search));
+            if ran_ns > 0 && others.rivals.len() < KEPT {
                 let priority = rival.priority.unwrap_or(0);
-                let who = format!("{} ({}) of real-time priority {priority}", rival.name, rival.id);
-                others.rivals.push((begin_ns, now_ns, who, since));
+                others.rivals.push(Rival {
+                    begin_ns: last_ns,
+                    end_ns: now_ns,
+                    who: format!("{} ({}) of real-time priority {priority}", rival.name, rival.id),
+                    ran_ns: ran_ns.min(now_ns - last_ns),
+                    loop_waited_ns,
+                });
             }
         }
         if let Some(found) = found {
-            seen.extend(found.clone());
-            (known, searched_ns) = (found, now_ns);
+            others.seen.extend(found.clone());
+            (known, since_search) = (found, 0);
         }
         last_ns = now_ns;
-        if looks == LOOKS_TO_A_SEARCH {
+        if looks == FEWEST_LOOKS {
             others.moments.push(moment(machine, "during"));
         }
     }
-    let passed_ns = (clock::now_ns() - begin_ns).max(1);
+    (before, others)
+}
+
+/// Searches all threads once more, and lists what ran; not while the loops run.
+pub fn after(machine: &Machine, (before, mut others): (Before, Others)) -> Others {
+    let passed_ns = (clock::now_ns() - before.begin_ns).max(1);
     others.moments.push(moment(machine, "after"));
     let after = foreign(machine);
+    let mut seen = std::mem::take(&mut others.seen);
     seen.extend(after.clone());
+    let ran_before = |id| before.threads.get(id).map_or(0, |b| b.ran_ns);
     let mut threads: Vec<OtherThread> = seen
         .values()
         .map(|t| OtherThread {
-            share: (t.ran_ns - before.get(&t.id).map_or(0, |b| b.ran_ns).min(t.ran_ns)) as f64 / passed_ns as f64,
+            share: t.ran_ns.saturating_sub(ran_before(&t.id)) as f64 / passed_ns as f64,
             name: t.name.clone(),
             id: t.id,
             core: t.core,
@@ -219,19 +272,30 @@ fn foreign(machine: &Machine) -> BTreeMap<u32, StatOfThread> {
 mod tests {
     use super::*;
 
-    fn ran(begin_ns: u64, end_ns: u64, ran_ns: u64) -> (u64, u64, String, u64) {
-        (begin_ns, end_ns, format!("busy {ran_ns}"), ran_ns)
+    fn ran(begin_ns: u64, end_ns: u64, ran_ns: u64, loop_waited_ns: Option<u64>) -> Rival {
+        Rival {
+            begin_ns,
+            end_ns,
+            who: format!("busy {ran_ns}"),
+            ran_ns,
+            loop_waited_ns,
+        }
     }
 
     #[test]
-    fn a_rival_is_named_only_if_it_ran_for_half_the_delay() {
+    fn a_rival_is_named_only_if_it_ran_and_the_loop_waited_for_half_the_delay() {
         let others = Others {
-            rivals: vec![ran(0, 100, 40), ran(100, 200, 90)],
+            rivals: vec![
+                ran(0, 100, 40, None),
+                ran(100, 200, 90, Some(60)),
+                ran(400, 500, 90, Some(10)),
+            ],
             ..Others::default()
         };
         assert!(others.rival(50, 130).is_some_and(|who| who.starts_with("busy 90")));
         assert_eq!(others.rival(0, 99), None, "40 of 99");
         assert_eq!(others.rival(300, 310), None);
+        assert_eq!(others.rival(420, 450), None, "the loop waited for 10 of 30");
     }
 
     #[test]

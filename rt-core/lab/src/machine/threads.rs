@@ -65,8 +65,24 @@ impl Machine {
 
     /// Returns the processor time of a thread so far.
     pub fn ran_ns(&self, process: u32, id: u32) -> Option<u64> {
+        self.schedstat(process, id, 0)
+    }
+
+    /// Returns the time so far in which a thread could run and another one had its core.
+    pub fn waited_ns(&self, process: u32, id: u32) -> Option<u64> {
+        self.schedstat(process, id, 1)
+    }
+
+    fn schedstat(&self, process: u32, id: u32, word: usize) -> Option<u64> {
         let text = self.text(&format!("proc/{process}/task/{id}/schedstat"))?;
-        text.split(' ').next()?.parse().ok()
+        text.split(' ').nth(word)?.parse().ok()
+    }
+
+    /// Returns the number of this process's thread of this name.
+    pub fn own_thread(&self, name: &str) -> Option<u32> {
+        let threads = self.names("proc/self/task");
+        let of_name = |id: &&String| self.text(&format!("proc/self/task/{id}/comm")).as_deref() == Some(name);
+        threads.iter().find(of_name)?.parse().ok()
     }
 
     /// Returns all processes that the kernel shows, in the order of their ids.

@@ -75,13 +75,6 @@ pub fn watch(instance: Instance, watched: &Watched, late: &Receiver<LateTick>) -
     witness.section
 }
 
-/// Returns the number of this process's thread of this name.
-fn thread_of(machine: &Machine, name: &str) -> Option<i32> {
-    let threads = machine.names("proc/self/task");
-    let of_name = |id: &&String| machine.text(&format!("proc/self/task/{id}/comm")).as_deref() == Some(name);
-    threads.iter().find(of_name)?.parse().ok()
-}
-
 impl Witness<'_> {
     fn count(&self) -> Counters {
         counters::read(self.watched.machine, self.watched.core, clock::now_ns())
@@ -97,7 +90,7 @@ impl Witness<'_> {
         self.section.late_ticks += ticks.len() as u64;
         self.own_pid = self
             .own_pid
-            .or_else(|| thread_of(self.watched.machine, self.watched.thread));
+            .or_else(|| Some(self.watched.machine.own_thread(self.watched.thread)? as i32));
         let Some(own_pid) = self.own_pid.filter(|_| ticks.iter().any(|t| self.wants(t))) else {
             return;
         };

@@ -84,6 +84,13 @@ pub fn arm(ask: Ask) -> Result<Armed, Refused> {
     })
 }
 
+/// Lets the calling thread run only when no other one needs its core. Does nothing if the kernel refuses.
+pub fn give_way() {
+    let parameters = libc::sched_param { sched_priority: 0 };
+    // SAFETY: `parameters` is valid for reads; 0 names the calling thread.
+    unsafe { libc::sched_setscheduler(0, libc::SCHED_IDLE, &parameters) };
+}
+
 /// Keeps all threads on one heap that returns no memory. Call it before other threads exist: a thread keeps a heap it
 /// already has. Large blocks are separate ([`stylet_heap`]).
 pub fn keep_one_heap() {
