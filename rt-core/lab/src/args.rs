@@ -4,6 +4,7 @@ use crate::compare::Against;
 use crate::load::Load;
 use crate::machine::{Machine, Throttle};
 use crate::measure;
+use crate::sample::LATE_SHARE;
 use crate::spin::Spin;
 use crate::whose::WhoseArgs;
 use clap::Args;
@@ -47,6 +48,10 @@ pub struct LatencyArgs {
     /// period]
     #[arg(long, value_name = "N", requires = "trace", value_parser = clap::value_parser!(u64).range(1..))]
     pub trace_over_us: Option<u64>,
+    /// Let a thread that only sleeps keep watch beside the force loop, on its core and one priority above it: whether a
+    /// late tick is the loop's own; makes each tick a few microseconds later
+    #[arg(long)]
+    pub witness: bool,
     /// Rounds of the comparison; each measures both sides once, 0 measures none
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(0..=100), value_name = "N")]
     pub rounds: u32,
@@ -88,6 +93,9 @@ pub enum ArgsError {
     /// Problems with the options of every run.
     #[error(transparent)]
     Options(#[from] OptionsError),
+    /// A witness without a core or a priority.
+    #[error("--witness needs real-time priority and a core for the force loop")]
+    Witness,
     /// The loop would take more of its core than the kernel gives to real-time threads.
     #[error(
         "--spin-us {given_us}: at {rate_hz} Hz at most {longest_us}, or the kernel would stop the loop for its share of real-time work"
@@ -113,6 +121,9 @@ impl LatencyArgs {
         options.wait = Wait::at_period(options.haptic_period_ns);
         if let Some(early_us) = self.early_us {
             options.wait.early_ns = early_us * 1_000;
+        }
+        if self.witness && (options.no_rt || options.haptic_core.is_none()) {
+            return Err(ArgsError::Witness);
         }
         let Spin::Fixed(spin_us) = self.spin_us else {
             return Ok(options);
@@ -149,8 +160,6 @@ impl LatencyArgs {
     }
 }
 
-/// A tick is late once it has used this fraction of its period before its end.
-const LATE_SHARE: u64 = 5;
 /// Fraction of a core kept free for the loop itself and for everything else of real-time priority.
 const SHARE_KEPT_FREE: f64 = 0.15;
 

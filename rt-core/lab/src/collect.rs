@@ -1,12 +1,14 @@
 //! Collects the times of each tick into histograms, windows and the latest wake-ups; at normal priority.
 
-use crate::sample::{Batched, PARTS, Sample};
+use crate::sample::{Batched, PARTS, Sample, late_from_ns};
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 use stylet_runtime::rt::timing::{MAX_STAGES, TickTimes};
 
 /// Latest wake-ups that are kept one by one.
 pub const WORST_KEPT: usize = 16;
+/// Most late wake-ups that are kept in the order of time.
+const LATE_KEPT: usize = 1 << 14;
 /// Pause between two rounds that empty the ring; it holds seconds.
 const PAUSE: Duration = Duration::from_millis(5);
 
@@ -66,6 +68,8 @@ pub struct LoopTiming {
     pub recording: Batched,
     pub windows: Vec<Window>,
     pub worst: [LateTick; WORST_KEPT],
+    /// The first late wake-ups, in the order of time.
+    pub late_wakes: Vec<LateTick>,
     /// Wake-ups in the order of time.
     pub sample: Sample,
     pub first_due_ns: u64,
@@ -80,6 +84,7 @@ pub struct LoopTiming {
     pub toggles: Vec<ToggleTime>,
     /// Channel for ticks late by this many nanoseconds, wake-up and work together.
     late: Option<(u64, Sender<LateTick>)>,
+    late_ns: u64,
     plan: Plan,
     seen: u64,
     last_woke_ns: u64,
@@ -98,6 +103,7 @@ impl LoopTiming {
             recording: Batched::default(),
             windows: vec![Window::default(); plan.windows],
             worst: [LateTick::default(); WORST_KEPT],
+            late_wakes: Vec::with_capacity(LATE_KEPT),
             sample: Sample::default(),
             first_due_ns: 0,
             last_due_ns: 0,
@@ -107,6 +113,7 @@ impl LoopTiming {
             lost: 0,
             toggles: Vec::new(),
             late: None,
+            late_ns: late_from_ns(plan.period_ns),
             plan,
             seen: 0,
             last_woke_ns: 0,
@@ -231,6 +238,9 @@ impl LoopTiming {
         {
             // The receiver may be gone.
             let _ = late.send(tick);
+        }
+        if wake_ns >= self.late_ns && self.late_wakes.len() < LATE_KEPT {
+            self.late_wakes.push(tick);
         }
         self.note_worst(tick);
     }

@@ -34,6 +34,7 @@ pub fn page(report: &Report, raw: &Raw) -> Result<String, DrawError> {
         }
         (times::host(report))
         (times::comparison(report))
+        (times::paired(report))
         (times::spin(report))
         (machine::stiffness(report))
         (machine::counters(report))

@@ -84,6 +84,9 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
     if let Some(why) = measured.trace.as_ref().and_then(|t| t.absent.as_ref()) {
         eprintln!("rt-core: no causes: {why}");
     }
+    if args.witness && measured.paired.is_none() {
+        eprintln!("rt-core: no witness: the kernel grants no priority above that of the force loop");
+    }
     let traced = measured.trace.as_ref().is_some_and(|t| t.absent.is_none());
     let comparison = match args.against().filter(|against| traced || *against != Against::Untraced) {
         Some(against) => {
@@ -123,6 +126,7 @@ fn setup_of<'a>(args: &'a LatencyArgs, options: &'a Options) -> Setup<'a> {
     Setup {
         trace_over_ns: args.trace_over_ns(),
         toggle: args.toggle,
+        witness: args.witness,
         ..Setup::new(options, args.duration, args.load, &args.out)
     }
 }
@@ -144,6 +148,9 @@ fn print_verdict(report: &Report) {
         );
     }
     println!("{}", report.others.words());
+    if let Some(paired) = &report.paired {
+        println!("{}", paired.words());
+    }
     if !report.environment.qualified {
         println!("environment not qualified: {}", report.environment.evidence.join("; "));
     }

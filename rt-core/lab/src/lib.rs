@@ -26,6 +26,7 @@ pub mod load;
 mod machine;
 mod measure;
 mod others;
+mod paired;
 mod plots;
 mod provenance;
 mod raw;

@@ -6,6 +6,7 @@ use crate::host::{Host, HostError, HostReport, Script};
 use crate::load::{Load, LoadError, Running};
 use crate::machine::Machine;
 use crate::others::{self, Others};
+use crate::paired::{self, Paired};
 use crate::trace::{self, TraceSection, Watched};
 use crate::watch::{self, CoreWatch};
 use serde::{Deserialize, Serialize};
@@ -48,10 +49,12 @@ pub struct Setup<'a> {
     pub checkpoints: Option<&'a Checkpoints<'a>>,
     /// Pin that the force loop toggles for an instrument.
     pub toggle: Option<Pin>,
+    /// A witness keeps watch beside the force loop.
+    pub witness: bool,
 }
 
 impl<'a> Setup<'a> {
-    /// Makes a run without trace, checkpoints and pin.
+    /// Makes a run without trace, checkpoints, pin and witness.
     pub fn new(options: &'a Options, duration_ns: u64, load: Load, folder: &'a Path) -> Self {
         Self {
             options,
@@ -61,6 +64,7 @@ impl<'a> Setup<'a> {
             trace_over_ns: None,
             checkpoints: None,
             toggle: None,
+            witness: false,
         }
     }
 }
@@ -110,6 +114,7 @@ pub struct Measured {
     pub gaps: GapReport,
     pub cores: Vec<CoreWatch>,
     pub others: Others,
+    pub paired: Option<Paired>,
     pub trace: Option<TraceSection>,
     pub window_ns: u64,
     /// When it began, whole seconds since 1970.
@@ -231,7 +236,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         over_ns,
     });
     let instance = tracing.as_ref().map(|_| trace::Instance::start());
-    let (run, host, gaps, cores, others, trace, haptic, tissue, second) = std::thread::scope(|threads| {
+    let (run, host, gaps, cores, others, paired, trace, haptic, tissue, second) = std::thread::scope(|threads| {
         let stop = &stop;
         let trace = tracing
             .as_ref()
@@ -270,6 +275,8 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
             from_core: core,
         };
         let others = threads.spawn(move || others::watch(machine, looked_at, before, stop));
+        let paired =
+            (setup.witness).then(|| threads.spawn(move || paired::watch(machine, options, FORCE_THREAD, stop)));
         let cores: Vec<_> = watched
             .into_iter()
             .flatten()
@@ -279,6 +286,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         stop.store(true, Ordering::Release);
         let cores: Vec<CoreWatch> = cores.into_iter().filter_map(|t| t.join().ok()).collect();
         let others = others.join();
+        let paired = paired.map(|thread| thread.join());
         let (haptic, tissue) = (haptic.join(), tissue.join());
         let second = second.map(|thread| thread.join());
         // It ends when the force loop's gathering ends.
@@ -289,6 +297,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
             gaps.join(),
             cores,
             others,
+            paired,
             trace,
             haptic,
             tissue,
@@ -313,6 +322,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         gaps: gaps.map_err(panicked)?,
         cores,
         others: others.map_err(panicked)?,
+        paired: paired.transpose().map_err(panicked)?.flatten(),
         trace: trace.transpose().map_err(panicked)?,
         window_ns,
         began_s,

@@ -3,6 +3,7 @@
 
 use crate::compare::Comparison;
 use crate::measure::Measured;
+use crate::paired::{BOTH, LOOP_ALONE, WITNESS};
 use crate::sample::{PARTS, histogram};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -72,6 +73,11 @@ impl Raw {
             all.push((format!("host/{name}"), batched.whole.clone()));
             let parts = (1..).zip(&batched.parts);
             all.extend(parts.map(|(i, part)| (format!("host/{name}/part_{i}"), part.clone())));
+        }
+        if let Some(paired) = &measured.paired {
+            let [loop_alone, both] = paired.sort(&measured.haptic.late_wakes);
+            let named = [(WITNESS, paired.wake.clone()), (LOOP_ALONE, loop_alone), (BOTH, both)];
+            all.extend(named.map(|(name, h)| (name.to_owned(), h)));
         }
         all.push(("gap_watch/gaps".to_owned(), measured.gaps.gaps.clone()));
         all.push(("gap_watch/wake".to_owned(), measured.gaps.wake.clone()));

@@ -11,6 +11,7 @@ use crate::bound::MissBound;
 use crate::compare::Comparison;
 use crate::load::Load;
 use crate::others::Others;
+use crate::paired::PairedSection;
 use crate::provenance::{Fact, ProgramDigest, Setting};
 use crate::spin::SpinSearch;
 use crate::stationary::Stationarity;
@@ -169,6 +170,9 @@ pub struct Report {
     pub gaps: GapSection,
     pub cores: Vec<CoreWatch>,
     pub others: Others,
+    /// Whose the late wake-ups are, if a witness was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paired: Option<PairedSection>,
     pub comparison: Option<Comparison>,
     /// Search for the spin; only with `--spin-us auto`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

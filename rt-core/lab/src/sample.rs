@@ -17,6 +17,14 @@ pub fn histogram() -> Histogram<u64> {
     Histogram::new_with_bounds(1, LONGEST_NS, DIGITS).expect("the bounds are constants that fit")
 }
 
+/// A wake-up is late once it has used this fraction of its period.
+pub const LATE_SHARE: u64 = 5;
+
+/// Returns the lateness from which a wake-up is late, where a bin of the histogram begins.
+pub fn late_from_ns(period_ns: u64) -> u64 {
+    histogram().lowest_equivalent(period_ns / LATE_SHARE)
+}
+
 /// Values of a run, together and in its equal parts, whose differences show how far values depend on each other.
 #[derive(Clone)]
 pub struct Batched {

@@ -103,6 +103,25 @@ pub fn spin(r: &Report) -> Markup {
     html! { h2 { "Spin before each deadline" } p { (micro(&s.words())) "." } }
 }
 
+/// Tabulates the wake-ups of the loop and of its witness.
+pub fn paired(r: &Report) -> Markup {
+    let Some(p) = &r.paired else {
+        return Markup::default();
+    };
+    let wake = r.haptic.times.iter().find(|t| t.name == "wake-up");
+    let times: Vec<Summary> = wake.into_iter().chain([&p.witness]).cloned().collect();
+    html! {
+        h2 { "Beside a witness" }
+        (time_table(&times))
+        p { (micro(&p.words())) "." }
+        p class="faint" {
+            "The witness only sleeps, on the same core for the same deadlines, one priority above. A late wake-up is of the \
+             loop alone if the witness was less than half as late. Where both are late, the machine or a thread that nothing \
+             preempts had the core. The witness makes each tick a few microseconds later."
+        }
+    }
+}
+
 pub fn late(r: &Report) -> Markup {
     let row = |l: &crate::report::Late| {
         vec![

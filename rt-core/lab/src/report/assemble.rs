@@ -11,6 +11,7 @@ use crate::gaps::GapReport;
 use crate::load::Load;
 use crate::machine::Machine;
 use crate::measure::{Measured, WARM_UP_S, counts};
+use crate::paired::PairedSection;
 use crate::provenance;
 use crate::raw::Raw;
 use crate::sealed::NO_DIGEST;
@@ -104,6 +105,7 @@ pub fn report(parts: &Parts, raw: &Raw) -> Report {
         },
         cores: measured.cores.clone(),
         others: measured.others.clone(),
+        paired: measured.paired.as_ref().map(|_| PairedSection::of(raw, period_ns)),
         comparison: parts.comparison.clone(),
         spin_search: parts.spin_search.clone(),
         settings: provenance::settings(parts.machine, options, &measured.run),
@@ -163,7 +165,15 @@ fn cause(measured: &Measured, tick: &LateTick) -> String {
         || {
             let woke_ns = tick.due_ns + tick.wake_ns;
             let rival = measured.others.rival(tick.due_ns, woke_ns);
-            rival.unwrap_or_else(|| seen_elsewhere(&measured.gaps, tick.due_ns, woke_ns))
+            let elsewhere = || seen_elsewhere(&measured.gaps, tick.due_ns, woke_ns);
+            let paired = measured.paired.as_ref().and_then(|p| p.words(tick));
+            rival.unwrap_or_else(|| {
+                [paired, Some(elsewhere())]
+                    .into_iter()
+                    .flatten()
+                    .collect::<Vec<_>>()
+                    .join("; ")
+            })
         },
         |o| o.cause.clone(),
     )

@@ -2,6 +2,7 @@
 
 use super::{Environment, GapSection, HostSection, LoopCounts, LoopSection, Margin, Report, StiffnessSection, Verdict};
 use crate::bound;
+use crate::paired::{BOTH, LOOP_ALONE, PairedSection};
 use crate::provenance;
 use crate::raw::Raw;
 use crate::sample::{PARTS, histogram};
@@ -54,6 +55,7 @@ pub fn derive(r: &mut Report, raw: &Raw, limits: &Limits) {
     if let Some(comparison) = &mut r.comparison {
         comparison.set_ratios();
     }
+    r.paired = r.paired.as_ref().map(|_| PairedSection::of(raw, period_ns));
     r.environment = environment(r);
     let loops = [("haptic", &r.haptic), ("tissue", &r.tissue)];
     let second = r.second.as_ref().map(|s| ("second", s));
@@ -239,6 +241,21 @@ pub fn contradictions(r: &Report, raw: &Raw) -> Vec<String> {
         must(
             all_fit && joined == raw.get(&h),
             format!("histograms.hlog: the parts of {name} are not its whole"),
+        );
+    }
+    for late in [LOOP_ALONE, BOTH].iter().flat_map(|tag| {
+        raw.get(tag)
+            .iter_recorded()
+            .map(|b| b.value_iterated_to())
+            .collect::<Vec<_>>()
+    }) {
+        let sorted = [LOOP_ALONE, BOTH]
+            .map(|tag| raw.get(tag).count_at(late))
+            .iter()
+            .sum::<u64>();
+        must(
+            sorted <= wake.count_at(late),
+            format!("paired: {sorted} late wake-ups of {late} ns, the histogram of wake-ups has fewer"),
         );
     }
     let c = &r.haptic.counts;

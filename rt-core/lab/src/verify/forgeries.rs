@@ -11,6 +11,7 @@ use crate::load::Load;
 use crate::machine::Machine;
 use crate::measure::Measured;
 use crate::others::Others;
+use crate::paired::Paired;
 use crate::raw::Raw;
 use crate::report::{HISTOGRAMS, PAGE, Parts, WAKES, report};
 use crate::sample::{Batched, histogram};
@@ -67,6 +68,8 @@ fn genuine(root: &Path, seed: u64) -> PathBuf {
     let options = args.options().expect("valid");
     let mut tip_to_host = Batched::default();
     (0..2_400).for_each(|i| tip_to_host.take(i / 300, 500_000 + random.draw() % 500_000));
+    let mut paired = Paired::default();
+    (1..=2_400).for_each(|i| paired.take(i * 1_000_000, 5_000 + random.draw() % 60_000, 100_000));
     let mut run = RunReport::default();
     (run.haptic.ticks, run.tissue.ticks) = (2_400, 480);
     let measured = Measured {
@@ -93,6 +96,7 @@ fn genuine(root: &Path, seed: u64) -> PathBuf {
         },
         cores: Vec::new(),
         others: Others::default(),
+        paired: Some(paired),
         trace: None,
         window_ns: 500_000_000,
         began_s: jiff::Timestamp::now().as_second() as u64 - 3,
