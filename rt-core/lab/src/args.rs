@@ -20,6 +20,9 @@ pub struct LatencyArgs {
     /// How long to measure: 60s, 10m, 1h
     #[arg(long, default_value = "60s", value_parser = duration_ns, value_name = "TIME")]
     pub duration: u64,
+    /// Measure N times, each into a folder of its own in DIR, and say how far the runs differ: DIR/spread.json
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000), value_name = "N", conflicts_with = "external")]
+    pub repeat: u32,
     /// What runs beside the loops
     #[arg(long, value_enum, default_value_t = Load::None)]
     pub load: Load,

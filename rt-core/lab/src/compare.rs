@@ -105,6 +105,9 @@ pub enum CompareError {
     /// The other side.
     #[error(transparent)]
     Tool(#[from] ToolError),
+    /// There is nothing to compare with.
+    #[error("--compare: {0}")]
+    Impossible(String),
     /// Histograms of different bins; a bug.
     #[error("histograms: {0}")]
     Histograms(String),
@@ -130,6 +133,21 @@ pub enum ToolError {
     Interrupted,
 }
 
+/// Returns why there is nothing to compare with.
+pub fn impossible(setup: &Setup, against: Against) -> Option<String> {
+    match (against, setup.load) {
+        (Against::Untraced, _) if setup.trace_over_ns.is_none() => {
+            Some("there is no trace to compare with; give --trace".to_owned())
+        }
+        (Against::Cyclictest, Load::Window) => {
+            Some("the window draws nothing without our loops; give --compare unloaded".to_owned())
+        }
+        (Against::Cyclictest, _) if version().is_none() => Some(ToolError::Missing.to_string()),
+        (Against::Unloaded, Load::None) => Some("there is no load to compare with; give --load".to_owned()),
+        _ => None,
+    }
+}
+
 /// Measures our loops and the other side alternately, `rounds` times each.
 pub fn compare(
     setup: &Setup,
@@ -147,17 +165,7 @@ pub fn compare(
     };
     let mut comparison = Comparison {
         against,
-        absent: match (against, &tool, setup.load) {
-            (Against::Untraced, _, _) if setup.trace_over_ns.is_none() => {
-                Some("there is no trace to compare with; give --trace".to_owned())
-            }
-            (_, None, _) => Some(ToolError::Missing.to_string()),
-            (Against::Cyclictest, _, Load::Window) => {
-                Some("the window draws nothing without our loops; give --compare unloaded".to_owned())
-            }
-            (Against::Unloaded, _, Load::None) => Some("there is no load to compare with; give --load".to_owned()),
-            _ => None,
-        },
+        absent: impossible(setup, against),
         tool: tool.unwrap_or_default(),
         names: COMPARED.map(|(name, _)| name.to_owned()),
         turn_s: turn_ns as f64 / 1e9,

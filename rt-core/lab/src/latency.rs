@@ -1,7 +1,7 @@
 //! `rt-core latency`: measures, compares with the limits, writes the report, prints the verdict.
 
 use crate::args::{ArgsError, LatencyArgs};
-use crate::compare::{Against, CompareError, compare};
+use crate::compare::{self, Against, CompareError, compare};
 use crate::disk::{self, DiskError};
 use crate::external::{self, ExternalError};
 use crate::files::{self, FilesError};
@@ -11,9 +11,11 @@ use crate::raw::Raw;
 use crate::report::{self, JSON, PAGE, Parts, Report};
 use crate::sign::{self, SignError};
 use crate::spin::{self, Spin, SpinError};
+use crate::spread::{self, SPREAD};
 use crate::verdict::{self, LimitsError, Outcome};
 use crate::whose::WhoseError;
-use std::sync::atomic::AtomicBool;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_runtime::process::Options;
 
 /// Reason why there is no report; the text is for people.
@@ -51,26 +53,53 @@ pub enum LatencyError {
     Sign(#[from] SignError),
 }
 
-/// Runs the measurement; the exit code is the verdict: 0 pass, 1 fail, 2 not measurable.
+/// Runs the measurement, or more of them; the exit code is the worst verdict: 0 pass, 1 fail, 2 not measurable.
 pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyError> {
     if let Some(file) = &args.external {
         return Ok(external::run(&args.out, file, args.motion.as_deref())?);
     }
+    if args.repeat == 1 {
+        return Ok(measure_into(args, &args.out, interrupted)?.exit_code());
+    }
+    disk::make(&args.out)?;
+    disk::keep_what_is_there(&args.out.join(SPREAD))?;
+    let mut worst = Outcome::Pass;
+    for i in 1..=args.repeat {
+        eprintln!("rt-core: run {i} of {}", args.repeat);
+        worst = worst.max(measure_into(args, &spread::folder(&args.out, i), interrupted)?);
+        // SYNC: set by a signal handler; nothing but the flag is carried.
+        if interrupted.load(Ordering::Acquire) {
+            break;
+        }
+    }
+    spread::write(&args.out)?;
+    Ok(worst.exit_code())
+}
+
+/// Measures once, and writes the report into `out`.
+fn measure_into(args: &LatencyArgs, out: &Path, interrupted: &AtomicBool) -> Result<Outcome, LatencyError> {
     let mut options = args.options()?;
     let whose = args.whose.read()?;
     let limits = verdict::limits(options.haptic_period_ns, &args.limit)?;
-    disk::make(&args.out)?;
-    disk::keep_what_is_there(&args.out.join(JSON))?;
+    verdict::check_duration(&args.limit, args.duration, options.haptic_period_ns)?;
+    if let Some(why) = args
+        .compare
+        .and_then(|against| compare::impossible(&setup_of(args, out, &options), against))
+    {
+        return Err(CompareError::Impossible(why).into());
+    }
+    disk::make(out)?;
+    disk::keep_what_is_there(&out.join(JSON))?;
     let mut spin_search = None;
     if args.spin_us == Spin::Auto {
         eprintln!("rt-core: looking for the smallest spin, trials of three seconds");
-        let setup = setup_of(args, &options);
+        let setup = setup_of(args, out, &options);
         let search = spin::search(&setup, args.longest_spin_us(), interrupted)?;
         println!("{}", search.words());
         options.wait.spin_ns = search.used_us * 1_000;
         spin_search = Some(search);
     }
-    let setup = setup_of(args, &options);
+    let setup = setup_of(args, out, &options);
     eprintln!(
         "rt-core: measuring for {:.0} s at {} Hz on scene '{}'",
         args.duration as f64 / 1e9,
@@ -79,7 +108,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
     );
     let measured = measure(&setup, interrupted)?;
     if args.toggle.is_some() {
-        external::keep(&args.out, &measured.haptic.toggles).map_err(DiskError::from)?;
+        external::keep(out, &measured.haptic.toggles).map_err(DiskError::from)?;
     }
     if let Some(why) = measured.trace.as_ref().and_then(|t| t.absent.as_ref()) {
         eprintln!("rt-core: no causes: {why}");
@@ -111,23 +140,23 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
         nonce: args.nonce.as_deref(),
     };
     let mut report = report::report(&parts, &raw);
-    let json = args.out.join(JSON);
-    files::write(&args.out, &mut report, &raw)?;
+    let json = out.join(JSON);
+    files::write(out, &mut report, &raw)?;
     print_verdict(&report);
-    println!("{}", args.out.join(PAGE).display());
+    println!("{}", out.join(PAGE).display());
     println!("{}", json.display());
     if let Some(key) = &whose.sign {
         println!("{}", sign::sign(&json, key)?.display());
     }
-    Ok(report.verdict.overall.exit_code())
+    Ok(report.verdict.overall)
 }
 
-fn setup_of<'a>(args: &'a LatencyArgs, options: &'a Options) -> Setup<'a> {
+fn setup_of<'a>(args: &LatencyArgs, out: &'a Path, options: &'a Options) -> Setup<'a> {
     Setup {
         trace_over_ns: args.trace_over_ns(),
         toggle: args.toggle,
         witness: args.witness,
-        ..Setup::new(options, args.duration, args.load, &args.out)
+        ..Setup::new(options, args.duration, args.load, out)
     }
 }
 

@@ -36,6 +36,7 @@ mod saved;
 mod sealed;
 mod sign;
 mod spin;
+mod spread;
 mod stationary;
 mod summary;
 mod trace;

@@ -8,6 +8,7 @@ use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stylet_report::parts::duration;
+use stylet_runtime::rt::clock::TISSUE_PERIOD_NS;
 use stylet_shm_schema::ProblemList;
 
 /// Reading that a limit applies to.
@@ -28,6 +29,26 @@ enum Reading {
     ExtraSwitches,
     RecordsMissing,
     Faults,
+}
+
+impl Reading {
+    /// Returns the percentile that it reads; `None` for a maximum or a count.
+    fn quantile(self) -> Option<f64> {
+        match self {
+            Self::Wake(q) | Self::Work(q) | Self::Path(q) | Self::Jitter(q) | Self::Recording(q) => Some(q),
+            Self::TipToTissue(q) | Self::TipToHost(q) | Self::StiffnessMargin(q) => Some(q),
+            _ => None,
+        }
+        .filter(|q| *q < MAX)
+    }
+
+    /// Returns the time between two of its samples, where the force loop has `period_ns`.
+    fn period_ns(self, period_ns: u64) -> u64 {
+        match self {
+            Self::TipToTissue(_) | Self::TipToHost(_) => TISSUE_PERIOD_NS,
+            _ => period_ns,
+        }
+    }
 }
 
 /// One row of the table of limits.
@@ -120,6 +141,16 @@ pub enum LimitProblem {
     /// No limit has that name.
     #[error("--limit: no limit is called {0:?}")]
     Unknown(String),
+    /// The run would end before anything can be said.
+    #[error("--limit: {name} needs a run of {}, this one has {}", duration(*.needs_s), duration(*.has_s))]
+    TooShort {
+        /// The limit.
+        name: &'static str,
+        /// Length that its percentile needs, s.
+        needs_s: f64,
+        /// Length of the run, s.
+        has_s: f64,
+    },
 }
 
 /// Returns the defaults, overridden by the command line.
@@ -136,6 +167,23 @@ pub fn limits(period_ns: u64, given: &[String]) -> Result<Limits, LimitsError> {
         }
     }
     Ok(ProblemList::check(problems).map(|()| limits)?)
+}
+
+/// Checks that a run is long enough for the percentiles that the command line asks for; those of the defaults say in the
+/// report how long it must be.
+pub fn check_duration(given: &[String], duration_ns: u64, period_ns: u64) -> Result<(), LimitsError> {
+    let has_s = duration_ns as f64 / 1e9;
+    let too_short = |word: &String| {
+        let name = word.split_once('=')?.0;
+        let spec = LIMITS.iter().find(|l| l.name == name)?;
+        let needs_s = needed(spec.reading.quantile()?) as f64 * spec.reading.period_ns(period_ns) as f64 / 1e9;
+        (needs_s > has_s).then_some(LimitProblem::TooShort {
+            name: spec.name,
+            needs_s,
+            has_s,
+        })
+    };
+    Ok(ProblemList::check(given.iter().filter_map(too_short).collect())?)
 }
 
 /// Result of one limit, or of all together; the worst is the greatest.
@@ -318,6 +366,19 @@ mod tests {
         let l = limits(500_000, &given).expect("all are known");
         assert_eq!((l["wake_p50_us"], l["wake_p99_us"]), (7.0, 100.0));
         assert_eq!((l["wake_max_us"], l["recording_p99_us"]), (500.0, 1.0));
+    }
+
+    #[test]
+    fn a_run_too_short_for_a_given_limit_is_refused() {
+        let given = ["wake_p999_us=500", "tip_to_host_p99_us=9000", "wake_max_us=900"].map(str::to_owned);
+        let check = |seconds: u64, given| check_duration(given, seconds * 1_000_000_000, 1_000_000);
+        let why = check(4, &given).expect_err("two are too long").to_string();
+        assert!(
+            why.contains("wake_p999_us needs a run of 10 s") && why.contains("tip_to_host_p99_us"),
+            "{why}"
+        );
+        assert!(!why.contains("--limit: wake_max_us"), "{why}");
+        assert!(check(10, &given).is_ok() && check(1, &[]).is_ok());
     }
 
     #[test]

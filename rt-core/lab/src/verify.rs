@@ -9,6 +9,7 @@ use crate::provenance::sha256;
 use crate::report::{JSON, OLD_SCHEMA, SCHEMA};
 use crate::sealed::{self, MISSING};
 use crate::sign;
+use crate::spread::{self, SPREAD};
 use clap::Args;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -46,6 +47,9 @@ pub fn run(args: &VerifyArgs) -> Result<u8, DiskError> {
         let checked = campaign::check(&args.report, args.allowed_signers.as_deref())?;
         return Ok(said(&args.report.join(campaign::REPORT), checked.0, &checked.1));
     }
+    if args.report.join(SPREAD).exists() {
+        return runs(args);
+    }
     let file = if args.report.is_dir() {
         args.report.join(JSON)
     } else {
@@ -79,6 +83,17 @@ pub fn run(args: &VerifyArgs) -> Result<u8, DiskError> {
         }
     }
     Ok(said(&file, problems, &notes))
+}
+
+/// Checks each run below a folder, and the spread between them.
+fn runs(args: &VerifyArgs) -> Result<u8, DiskError> {
+    let mut worst = 0;
+    for report in spread::folders(&args.report) {
+        let args = VerifyArgs { report, ..args.clone() };
+        worst = worst.max(run(&args)?);
+    }
+    let problems = spread::problem(&args.report)?.into_iter().collect();
+    Ok(worst.max(said(&args.report.join(SPREAD), problems, &[])))
 }
 
 /// Prints the problems, without one the notes; returns the exit code.
