@@ -4,6 +4,7 @@
 //! second degree in place. Parts of a body have their own polynomials, and do not feel each other through the layers.
 
 mod cubes;
+mod kept;
 mod on_body;
 mod surface;
 
@@ -44,14 +45,16 @@ impl<T: Real> FemModel<T> {
             let m_per_pa: f64 = layers.iter().map(|layer| layer.thickness_m / layer.young_pa).sum();
             return on_springs(1.0 / m_per_pa.max(1e-12));
         }
-        let forces = surface.forces_n::<T>(&cubes, layers)?;
-        let mut rest = forces.as_slice();
+        let solved = kept::solved::<T>(cubes, surface, layers)?;
+        let (surface, held) = (&solved.surface, &solved.forces);
+        let mut first = 0;
         let mut springs_pa_per_m = 0.0;
         let mut parts = Vec::new();
         for part in &surface.parts {
-            let (forces, others) = rest.split_at(3 * part.shapes.len());
-            rest = others;
-            let stiffness = part.stiffness(&surface, forces);
+            let count = 3 * part.shapes.len();
+            let forces = &held.forces_n[first..first + count];
+            let stiffness = held.work_j.view((first, first), (count, count)).into_owned();
+            first += count;
             // The first three shapes are translations by one over the root of the area.
             let translation = part.area_m2 * stiffness.view((0, 0), (3, 3));
             springs_pa_per_m += translation.trace() / (3.0 * area_m2);
@@ -59,7 +62,7 @@ impl<T: Real> FemModel<T> {
         }
         let reaction = |(part, forces, stiffness, translation): (&PartOfSurface, _, _, nalgebra::DMatrix<f64>)| {
             let whole_m_per_n = translation.try_inverse()?.trace() / 3.0;
-            let on_body = part.on_body(&unit, &surface, forces, &stiffness);
+            let on_body = part.on_body(&unit, surface, forces, &stiffness);
             on_body.beyond_springs(springs_pa_per_m, stiffness, whole_m_per_n)
         };
         let mut model = on_springs(springs_pa_per_m)?;

@@ -225,6 +225,10 @@ impl<T: Real> BatchModel<T> {
             return;
         }
         let size = 3 * self.coarsest_nodes.len();
+        if size == 0 {
+            // A thin layer: all that is coarse touches what is fixed.
+            return;
+        }
         let mut matrix = nalgebra::DMatrix::<f64>::zeros(size, size);
         let nodes = &self.coarsest_nodes;
         let mut x = vec![nothing(); level.node_count];

@@ -11,6 +11,7 @@
 
 mod condensed;
 mod cycle;
+mod held;
 mod kernel;
 mod level;
 mod output;
@@ -18,7 +19,8 @@ mod parts;
 mod solve;
 mod support;
 
-pub(super) use condensed::{condensed, held_forces_n};
+pub(super) use condensed::condensed;
+pub(super) use held::{HeldForces, held_forces};
 pub use level::{BatchModel, Part};
 pub use solve::{BatchState, Progress};
 
@@ -38,6 +40,22 @@ pub struct NodeWeight {
 
 /// x, y, z of a node, each for every load.
 type Node<T> = [Eight<T>; 3];
+
+/// Maps the first half of a list here and the other one on a second thread, which has this one's priority.
+fn on_two_threads<A: Sync, B: Send>(list: &[A], map: impl Fn(&[A]) -> Vec<B> + Sync) -> Vec<B> {
+    let (first, second) = list.split_at(list.len().div_ceil(2));
+    std::thread::scope(|scope| {
+        let named = std::thread::Builder::new().name("layers".to_owned());
+        let other = named.spawn_scoped(scope, || map(second));
+        let mut mapped = map(first);
+        match other.map(std::thread::ScopedJoinHandle::join) {
+            Ok(Ok(others)) => mapped.extend(others),
+            Ok(Err(panic)) => std::panic::resume_unwind(panic),
+            Err(_) => mapped.extend(map(second)),
+        }
+        mapped
+    })
+}
 
 #[cfg(test)]
 mod tests;

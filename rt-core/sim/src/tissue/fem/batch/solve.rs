@@ -235,10 +235,10 @@ impl<T: Real> PlaneOp<T> for Product<'_, T> {
 }
 
 /// Number of nodes whose products are summed before the sum continues in f64.
-const SUMMED: usize = 256;
+pub(super) const SUMMED: usize = 256;
 
 #[inline(always)]
-fn add_up<T: Real, V: Vector<T>>(total: &mut [f64; LOADS], sums: V) {
+pub(super) fn add_up<T: Real, V: Vector<T>>(total: &mut [f64; LOADS], sums: V) {
     let mut each = Eight([T::ZERO; LOADS]);
     sums.store(&mut each);
     total

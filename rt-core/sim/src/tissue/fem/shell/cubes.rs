@@ -18,6 +18,7 @@ fn is_layer(kind: u8) -> bool {
 }
 
 /// Cubes around and in a body, in a box with room for the layers.
+#[derive(PartialEq)]
 pub(super) struct Cubes {
     pub dims: [usize; 3],
     pub edge_m: f64,

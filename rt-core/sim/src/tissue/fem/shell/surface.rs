@@ -3,7 +3,7 @@
 use super::cubes::Cubes;
 use super::on_body::OnBody;
 use crate::scene::Layer;
-use crate::tissue::fem::batch::{condensed, held_forces_n};
+use crate::tissue::fem::batch::{HeldForces, condensed, held_forces};
 use crate::tissue::fem::material::{FemProblem, FemSettings, Integration, Material, Structure};
 use crate::tissue::fem::model::FemModel;
 use crate::tissue::fem::real::Real;
@@ -16,6 +16,7 @@ const POISSON: f64 = 0.49;
 const LEAST_SURFACE: f64 = 0.05;
 
 /// Corners of cubes between the body and its layers.
+#[derive(PartialEq)]
 pub(super) struct Surface {
     corners: Vec<[usize; 3]>,
     places_m: Vec<[f64; 3]>,
@@ -24,6 +25,7 @@ pub(super) struct Surface {
     pub parts: Vec<PartOfSurface>,
 }
 
+#[derive(PartialEq)]
 pub(super) struct PartOfSurface {
     number: u32,
     /// Number of the corner in the surface.
@@ -82,11 +84,7 @@ impl Surface {
     }
 
     /// Returns the force on each corner that holds each shape of each part.
-    pub fn forces_n<T: Real>(
-        &self,
-        cubes: &Cubes,
-        layers: &[Layer],
-    ) -> Result<Vec<Vec<[f64; 3]>>, ProblemList<FemProblem>> {
+    pub fn forces<T: Real>(&self, cubes: &Cubes, layers: &[Layer]) -> Result<HeldForces, ProblemList<FemProblem>> {
         let (lattice, structure_of) = cubes.layers();
         let material = |layer: &Layer| {
             Structure::Elastic(Material {
@@ -117,7 +115,7 @@ impl Surface {
                 displacements_m.push(by_m);
             }
         }
-        Ok(held_forces_n(&condensed(&model), &held, &displacements_m))
+        Ok(held_forces(&condensed(&model), &held, &displacements_m))
     }
 }
 
@@ -173,16 +171,6 @@ impl PartOfSurface {
     /// Returns the value of a shape at a place.
     fn at(&self, shape: usize, place_m: [f64; 3]) -> f64 {
         value(&self.shapes[shape], &self.terms(place_m))
-    }
-
-    /// Returns the force along each shape that holds each.
-    pub fn stiffness(&self, surface: &Surface, forces: &[Vec<[f64; 3]>]) -> DMatrix<f64> {
-        let along = |m: usize, n: usize| -> f64 {
-            let at = |&c: &usize| self.at(m / 3, surface.places_m[c]) * forces[n][c][m % 3];
-            self.corners.iter().map(at).sum()
-        };
-        let stiffness = DMatrix::from_fn(forces.len(), forces.len(), along);
-        0.5 * (&stiffness + stiffness.transpose())
     }
 
     /// Transfers the forces from the corners of cubes to the nodes of the body.

@@ -175,6 +175,10 @@ fn what_layers_cost_and_do_in_paper_and_pelvis() {
             let model = FemTissue::<f32>::new(&scene).expect("valid").model;
             let made_s = seconds(begun);
             let begun = std::time::Instant::now();
+            let again = FemTissue::<f32>::new(&scene).expect("valid").model;
+            let again_s = seconds(begun);
+            assert_eq!(again.reactions.len(), model.reactions.len());
+            let begun = std::time::Instant::now();
             let body = BatchModel::new(&model);
             let condensed_s = seconds(begun);
             let (low, high) = scene.target_bounds_m();
@@ -197,7 +201,7 @@ fn what_layers_cost_and_do_in_paper_and_pelvis() {
             }
             let springs: f64 = model.levels[0].springs.iter().map(|s| f64::from(*s)).sum();
             println!(
-                "{name}, layers {is_layered}: made in {made_s:.2} s, condensed in {condensed_s:.2} s, {:.1} MB, springs {springs:.0} N/m, gland moves by {means:.4?} mm/N along x, y, z",
+                "{name}, layers {is_layered}: made in {made_s:.2} s, again in {again_s:.2} s, condensed in {condensed_s:.2} s, {:.1} MB, springs {springs:.0} N/m, gland moves by {means:.4?} mm/N along x, y, z",
                 body.bytes() as f64 / 1e6
             );
         }
