@@ -44,6 +44,7 @@ pub enum Action {
     /// Loads an image of the present scene's patient for the slices.
     LoadImage(PathBuf),
     CancelLoad,
+    Structures(StructuresAction),
     /// Opens a dialog for a file.
     PickFile(Purpose),
     /// Loads the scene of this index in [`stylet_shm_schema::BUILTIN_SCENES`].
@@ -75,6 +76,16 @@ pub enum Action {
     DismissRefusals,
     /// Marks the message about an unplugged device as read.
     DismissDisconnected,
+}
+
+/// Request of the operator in the table of a volume's structures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StructuresAction {
+    /// Makes them the scene.
+    Use,
+    /// Saves them as a scene file.
+    Save,
+    Close,
 }
 
 /// Request to the simulated hand that holds the ultrasound probe: moves along its axis (m), turns

@@ -2,16 +2,19 @@
 //! frame.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use stylet_base::job::{Job, JobUpdate};
 use stylet_files::agreed;
 use stylet_files::dicom::Shared;
-use stylet_files::{self as files, FileError, Image, LabelVolume, Progress, scene};
+use stylet_files::{self as files, FileError, Image, LabelVolume, Progress, Tissue, Voxels, scene};
 
 /// Result of reading a file.
 pub enum Loaded {
     /// Scene, and the image that its scene file names.
     Scene(Box<LabelVolume>, Option<Image>),
     Image(Image),
+    /// Labels whose structures a person names first, and the image to show with them.
+    Labels(Arc<Voxels>, Option<PathBuf>),
 }
 
 /// Error of a file that could not be read.
@@ -43,6 +46,21 @@ impl Loader {
     /// Starts to read a scene. `image` replaces the image that a scene file names.
     pub fn begin_scene(&mut self, path: &Path, label: Option<u8>, image: Option<PathBuf>) {
         self.begin(path, move |path, progress| scene_of(path, label, image, progress));
+    }
+
+    /// Starts to make a scene of these structures of a volume that was read; other labels are left out.
+    pub fn begin_structures(
+        &mut self,
+        path: &Path,
+        voxels: Arc<Voxels>,
+        structures: Vec<Tissue>,
+        image: Option<PathBuf>,
+    ) {
+        self.begin(path, move |path, progress| {
+            let name = files::bytes::file_name(path);
+            let volume = LabelVolume::from_tissues(&voxels, structures, name, progress);
+            scene_with(path, volume.map_err(|why| FileError::of(path, why))?, image, progress)
+        });
     }
 
     /// Starts to read an image, which must be of the patient of the scene's file.
@@ -110,11 +128,29 @@ fn image_of(path: &Path, scene_file: Option<&Path>, progress: &Progress) -> Resu
 }
 
 fn scene_of(path: &Path, label: Option<u8>, image: Option<PathBuf>, progress: &Progress) -> Result<Loaded, FileError> {
-    let (volume, named) = match scene::is_scene(path) && label.is_none() {
-        true => scene::load(path, progress).map(|(scene, volume)| (volume, scene.image))?,
-        false => (files::read(path, label, progress)?, None),
-    };
-    let Some(file) = image.or_else(|| named.map(|file| path.with_file_name(file))) else {
+    if label.is_some() {
+        return scene_with(path, files::read(path, label, progress)?, image, progress);
+    }
+    if scene::is_scene(path) {
+        let (scene, volume) = scene::load(path, progress)?;
+        let named = scene.image.map(|file| path.with_file_name(file));
+        return scene_with(path, volume, image.or(named), progress);
+    }
+    let voxels = files::read_voxels(path, progress)?;
+    if voxels.present().len() > 1 {
+        return Ok(Loaded::Labels(Arc::new(voxels), image));
+    }
+    let volume = LabelVolume::from_voxels(&voxels, None, files::bytes::file_name(path), progress);
+    scene_with(path, volume.map_err(|why| FileError::of(path, why))?, image, progress)
+}
+
+fn scene_with(
+    path: &Path,
+    volume: LabelVolume,
+    image: Option<PathBuf>,
+    progress: &Progress,
+) -> Result<Loaded, FileError> {
+    let Some(file) = image else {
         return Ok(Loaded::Scene(Box::new(volume), None));
     };
     let image = image_of(&file, Some(path), progress)?;

@@ -32,7 +32,7 @@ pub use load::read;
 pub use open::read_voxels;
 pub use progress::{Progress, Stage};
 pub use report::report;
-pub use volume::{LabelVolume, Tissue, VoxelValues, Voxels};
+pub use volume::{LabelVolume, Tissue, VoxelValues, Voxels, role_and_material, voxels_per_label};
 pub use watched::watched;
 
 /// Reader of the data file that a header names.

@@ -1,6 +1,8 @@
 //! Scene files (TOML): a volume, materials of its structures, needle, device and plan. All wrong values are reported at
 //! once.
 
+mod write;
+
 use super::bytes::{file_name, whole};
 use super::error::FileError;
 use super::open::read_voxels;
@@ -10,6 +12,7 @@ use crate::error::ContentError;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use stylet_anatomy::{Beyond, Layer, Material, Role, Surroundings};
+pub use write::to_text;
 
 const MAX_BYTES: usize = 1 << 20;
 const MAX_STRUCTURES: usize = 255;

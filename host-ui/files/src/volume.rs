@@ -153,7 +153,7 @@ impl LabelVolume {
         if label.is_none() && !voxels.names.is_empty() {
             return Self::from_tissues(voxels, by_name(voxels), name, progress);
         }
-        let present = present(voxels);
+        let present = voxels_per_label(voxels);
         let mut keep = [0_u8; 256];
         (1..=255)
             .filter(|&l| label.is_none_or(|only| only == l))
@@ -176,7 +176,7 @@ impl LabelVolume {
     ) -> Result<Self, ContentError> {
         let mut keep = [0_u8; 256];
         structures.iter().for_each(|t| keep[usize::from(t.label)] = t.label);
-        let present = present(voxels);
+        let present = voxels_per_label(voxels);
         let nothing = || "none of its structures has a voxel; export the segmentation again".to_owned();
         let mut volume = Self::resized(voxels, &keep, name, progress, nothing)?;
         let in_cells = |t: &Tissue| volume.cells.contains(&t.label);
@@ -248,7 +248,7 @@ impl LabelVolume {
                     layers: vec![Layer::FAT],
                     patient: patient_frame(&voxels.frame, voxels.dims, origin),
                     name,
-                    voxels_per_label: present(voxels),
+                    voxels_per_label: voxels_per_label(voxels),
                     warnings,
                 });
             }
@@ -313,7 +313,7 @@ fn upright((mut low, mut high): Bounds, flip: bool, dims: [usize; 3]) -> Bounds 
 }
 
 /// Returns each label but 0 with its number of voxels.
-fn present(v: &Voxels) -> Vec<(u8, u64)> {
+pub fn voxels_per_label(v: &Voxels) -> Vec<(u8, u64)> {
     let mut counts = [0_u64; 256];
     v.labels.iter().for_each(|&l| counts[usize::from(l)] += 1);
     (1..=255)
@@ -339,7 +339,7 @@ pub fn by_name(v: &Voxels) -> Vec<Tissue> {
             material,
         }
     };
-    present(v).into_iter().map(tissue).collect()
+    voxels_per_label(v).into_iter().map(tissue).collect()
 }
 
 fn tissue_bounds(v: &Voxels, keep: &[u8; 256]) -> Option<Bounds> {

@@ -129,6 +129,7 @@ impl App {
             Action::LoadScene(path) => self.load(&path, None),
             Action::LoadImage(path) => self.load_image(&path),
             Action::CancelLoad => self.cancel_load(),
+            Action::Structures(action) => self.act_on_structures(action),
             Action::PickFile(purpose) => self.pick_file(purpose),
             Action::StopRun => self.stop_run(),
             Action::Trainee(action) => self.act_on_trainees(action),

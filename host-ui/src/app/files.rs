@@ -1,11 +1,15 @@
 //! Files of the scene, and those that are chosen in a dialog.
 
 use super::App;
-use crate::action::{Action, PlanAction, WatchAction};
+use crate::action::{Action, PlanAction, StructuresAction, WatchAction};
 use crate::dialog::Purpose;
+use crate::panel::structures::StructureTable;
 use crate::panel::workflow::Progress;
+use crate::recent;
+use crate::shown::LoadState;
 use std::path::PathBuf;
-use stylet_files::Image;
+use std::sync::Arc;
+use stylet_files::{Image, Voxels};
 use stylet_host::core_args::SceneChoice;
 use stylet_shm_schema::{SceneHeader, SceneId};
 
@@ -17,6 +21,8 @@ pub(super) struct SceneFiles {
     pub first_scene: Option<SceneChoice>,
     pub first_image: Option<PathBuf>,
     pub uploading: Option<(u64, String)>,
+    /// Table of the structures of the file that was read last, until the core has them.
+    pub structures: Option<StructureTable>,
     /// File that is being read or sent as the next scene, and file of the present scene if this
     /// window sent it.
     pub scene_to_come: Option<SentScene>,
@@ -84,6 +90,37 @@ impl App {
                 Action::Plan(PlanAction::Export(path))
             }
         })
+    }
+
+    /// Shows the labels of the file that was read as a table.
+    pub(super) fn name_structures(&mut self, voxels: Arc<Voxels>, image: Option<PathBuf>) {
+        self.shown.load = LoadState::Idle;
+        let file = self.files.scene_to_come.as_ref();
+        self.files.structures = file.map(|file| StructureTable::of(file.path.clone(), voxels, image));
+    }
+
+    pub(super) fn act_on_structures(&mut self, action: StructuresAction) {
+        let Some(table) = &mut self.files.structures else {
+            return;
+        };
+        match action {
+            StructuresAction::Use => {
+                self.files.scene_to_come = Some(SentScene {
+                    path: table.path.clone(),
+                    name: String::new(),
+                    after: None,
+                });
+                let (voxels, image) = (table.voxels.clone(), table.image.clone());
+                self.loader
+                    .begin_structures(&table.path, voxels, table.structures(), image);
+            }
+            StructuresAction::Save => {
+                if let Some(path) = table.save() {
+                    recent::remember(&mut self.settings.recent, path, false);
+                }
+            }
+            StructuresAction::Close => self.files.structures = None,
+        }
     }
 
     /// Returns the action for a dropped file. A folder is an image series; while the plan's step is

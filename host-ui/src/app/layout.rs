@@ -6,6 +6,7 @@ use crate::panel::instructor::instructor_ui;
 use crate::panel::parameters::parameters_ui;
 use crate::panel::question::question_ui;
 use crate::panel::review::review_ui;
+use crate::panel::structures::structures_ui;
 use crate::panel::trainees::trainees_ui;
 use crate::panel::workflow::{Progress, editor_ui, foot_height, foot_ui, run_ui, workflow_ui};
 use crate::panel::{banners, class, help, plots, status};
@@ -55,6 +56,8 @@ impl App {
         };
         actions.extend(banners::banners_ui(ui.ctx(), pictures, &banners::banners(&self.shown)));
         parameters_ui(ui.ctx(), &self.shown, &mut self.parameters);
+        let table = self.files.structures.as_mut();
+        actions.extend(table.and_then(|table| structures_ui(ui.ctx(), &self.shown, table)));
         actions.extend(class::class_ui(ui.ctx(), &self.shown, &mut self.class));
         actions.extend(instructor_ui(
             ui.ctx(),

@@ -177,6 +177,9 @@ impl App {
                 return;
             }
             self.files.scene_file = self.files.scene_to_come.take();
+            if self.files.structures.take().is_some() {
+                self.workflow.open_present();
+            }
             self.shown.load = LoadState::Loaded(format!("{name} is the scene now"));
             if let Some((image, scene)) = image {
                 self.show_image(image, &scene);
@@ -208,6 +211,7 @@ impl App {
                 self.upload(&volume);
             }
             Some(Ok(Loaded::Image(image))) => self.take_image(image),
+            Some(Ok(Loaded::Labels(voxels, image))) => self.name_structures(voxels, image),
         }
         if let Some((what, share)) = self.loader.at() {
             self.shown.load = LoadState::Reading(what, share);

@@ -15,5 +15,6 @@ pub mod review;
 pub mod setup;
 pub mod status;
 mod strip;
+pub mod structures;
 pub mod trainees;
 pub mod workflow;

@@ -13,6 +13,8 @@ mod kept;
 #[cfg(test)]
 mod live;
 #[cfg(test)]
+mod own_data;
+#[cfg(test)]
 mod plan;
 #[cfg(test)]
 mod plugged;

@@ -3,6 +3,7 @@
 use super::text::Painted;
 use crate::app::{App, Options};
 use crate::dose_worker::{DoseOf, DoseResult};
+use crate::panel::structures::StructureTable;
 use crate::planner::tests::planned;
 use crate::planner::{Implant, NeedleProgress};
 use crate::shown::Shown;
@@ -12,6 +13,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use stylet_dose::Metric;
 use stylet_dose::criteria::{Figure, Limit};
+use stylet_files::{VoxelFrame, Voxels};
 use stylet_host::core_args::CoreArgs;
 use stylet_host::link::LinkStatus;
 use stylet_implant::plan::check::Problem;
@@ -149,6 +151,24 @@ impl Drawn {
 pub const LONG_NAME: &str = "Prostata_Zielvolumen_mit_Samenblasen_und_Sicherheitssaum_PTV_3mm";
 pub const LONG_PATH: &str = "/srv/klinik/strahlentherapie/brachytherapie/patienten/2026/studie-11/segmentierung-der-\
                              prostata-und-risikoorgane-mit-katheter-und-samenblasen.seg.nrrd";
+
+/// Returns the table of a file of twelve labels with the longest names.
+pub fn long_named_labels() -> StructureTable {
+    let voxels = Voxels {
+        dims: [12, 1, 1],
+        labels: (1..=12).collect(),
+        frame: VoxelFrame {
+            directions: nalgebra::Matrix3::identity(),
+            spacing_m: [1e-3; 3],
+            origin_m: nalgebra::Vector3::zeros(),
+            warning: None,
+        },
+        names: (1..=12).map(|label| (label, LONG_NAME.to_owned())).collect(),
+        also: Vec::new(),
+        overlap: None,
+    };
+    StructureTable::of(LONG_PATH.into(), Arc::new(voxels), None)
+}
 
 /// Returns a live core with the scene, and nothing planned.
 pub fn live() -> Shown {

@@ -1,7 +1,7 @@
 //! Every state of the window in all its sizes, with the longest possible texts.
 
 use super::class::{inject_exercises, line_to_a_core, trainees, whole_class};
-use super::fixture::{Drawn, LONG_PATH, dose, live, many_needles, one_needle, proposals};
+use super::fixture::{Drawn, LONG_PATH, dose, live, long_named_labels, many_needles, one_needle, proposals};
 use super::text::misplaced;
 use super::update::{deciding, drawing, searching};
 use crate::action::Action;
@@ -111,6 +111,10 @@ pub const STATES: &[State] = &[
             refused: true,
             text: format!("Debrief not saved: {LONG_PATH}/debrief.html: permission denied; choose another folder"),
         });
+    }),
+    ("structures of a file", |app| {
+        app.shown = live();
+        app.files.structures = Some(long_named_labels());
     }),
     ("parameters", |app| {
         app.shown = live();

@@ -58,6 +58,11 @@ impl WorkflowState {
         self.opened = Some(step);
     }
 
+    /// Opens the present step again.
+    pub fn open_present(&mut self) {
+        self.opened = None;
+    }
+
     /// Returns the open step: the present one, unless another was opened by hand since the
     /// procedure advanced.
     fn open(&mut self, now: Progress) -> Progress {
