@@ -158,6 +158,7 @@ impl App {
             Action::Redo => {}
             Action::Undo => match undo_action(&self.shown) {
                 Some(Undo::Seed) => self.send("Undo seed", &Request::UndoSeed),
+                Some(Undo::Reset) => self.send("Undo reset", &Request::UndoSeed),
                 Some(Undo::Plan) => {
                     self.planner.step_back();
                     self.withdraw_plan("Withdraw the plan");

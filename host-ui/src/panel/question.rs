@@ -7,6 +7,8 @@ use crate::words::counted;
 use egui::{Key, Modal, Modifiers};
 use stylet_shm_schema::{Fault, Request};
 
+const LOAD: &str = "Load the scene";
+
 /// Starting point of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Begin {
@@ -33,11 +35,11 @@ impl Question {
             Action::StartOver => "Start over",
             // The other runs continue with what is in the tissue.
             Action::RunAll if shown.continues_at.is_none() => "Reset and run",
-            Action::LoadScene(_) | Action::LoadBuiltinScene(_) => "Load the scene",
+            Action::LoadScene(_) | Action::LoadBuiltinScene(_) => LOAD,
             _ => return None,
         };
-        in_tissue(shown)?;
-        Some(Self::Remove(name, action.clone()))
+        let is_lost = in_tissue(shown).is_some() || name == LOAD && shown.is_in_tissue();
+        is_lost.then(|| Self::Remove(name, action.clone()))
     }
 }
 
@@ -55,6 +57,17 @@ fn in_tissue(shown: &Shown) -> Option<String> {
     }
 }
 
+/// Returns whether and how a removal can be undone.
+fn undone(action: &Action, shown: &Shown) -> &'static str {
+    match (action, shown.left.is_empty()) {
+        (Action::Send(Request::Reset), true) => "Ctrl+Z restores the seeds until the next one is dropped.",
+        (Action::Send(Request::Reset), false) if !shown.seeds.is_empty() => {
+            "Ctrl+Z restores the seeds until the next one is dropped, but not the needles."
+        }
+        _ => "This cannot be undone.",
+    }
+}
+
 /// Draws the question; Y and N answer it too, and Esc cancels it.
 pub fn question_ui(ctx: &egui::Context, shown: &Shown, question: Option<&Question>) -> Option<Action> {
     let (title, text, yes, no) = match question? {
@@ -68,12 +81,21 @@ pub fn question_ui(ctx: &egui::Context, shown: &Shown, question: Option<&Questio
                 "Leave the force off (N)",
             )
         }
-        Question::Remove(name, _) => {
-            let text = format!(
-                "This removes {} from the tissue, which cannot be undone. Plan and debrief are saved under out/ first.",
-                in_tissue(shown).unwrap_or_else(|| "nothing".to_owned())
-            );
-            (format!("{name}?"), text, format!("{name} (Y)"), "Keep the implant (N)")
+        Question::Remove(name, action) => {
+            let (text, no) = match in_tissue(shown) {
+                None => (
+                    "The needle is in the tissue: another scene ends the insertion.".to_owned(),
+                    "Keep the scene (N)",
+                ),
+                Some(what) => {
+                    let undone = undone(action, shown);
+                    let text = format!(
+                        "This removes {what} from the tissue. {undone} Plan and debrief are saved under out/ first."
+                    );
+                    (text, "Keep the implant (N)")
+                }
+            };
+            (format!("{name}?"), text, format!("{name} (Y)"), no)
         }
     };
     let pressed = |key| ctx.input_mut(|i| i.consume_key(Modifiers::NONE, key));

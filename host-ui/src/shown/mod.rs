@@ -50,6 +50,8 @@ pub struct Shown {
     pub seeds: Vec<SeedPose>,
     /// Planned seeds, from the plans in force that were received.
     pub heard: Vec<ReceivedSeed>,
+    /// Number of seeds that the last reset removed, until another is dropped.
+    pub removed: usize,
     /// Displacement of the body, and of its seeds, by an exercise.
     pub body_moved_m: [f64; 3],
     /// Bend of the needle in the last snapshot.
@@ -119,6 +121,7 @@ impl Shown {
         let of_fault = newest.find(|(kind, _)| matches!(kind, Some(EventKind::FaultRaised | EventKind::Rearmed)));
         let raised = of_fault.filter(|(kind, _)| *kind == Some(EventKind::FaultRaised));
         self.last_fault = raised.map_or_else(String::new, |(_, event)| event.text.read());
+        let seeds_before = self.seeds.len();
         self.seeds.clear();
         self.bend.clear();
         self.left.clear();
@@ -131,6 +134,7 @@ impl Shown {
             self.left.extend_from_slice(snapshot.header.left());
             self.snapshot_residual = Some(snapshot.header.residual);
         }
+        self.take_removed(seeds_before, link);
     }
 
     /// Returns the drawn place of a seed, which follows the body.

@@ -1,8 +1,28 @@
-//! Distance of each seed at rest from its planned place.
+//! Distance of each seed at rest from its planned place, and seeds that a reset removed.
 
 use super::Shown;
+use stylet_host::link::Link;
 use stylet_implant::pairing::{self, SeedOffset};
-use stylet_shm_schema::{PlannedSeed, SeedPose};
+use stylet_shm_schema::{EventKind, PlannedSeed, SeedPose};
+
+impl Shown {
+    /// Notes how many seeds a reset has just removed: the core restores them until another is dropped.
+    pub(super) fn take_removed(&mut self, before: usize, link: &Link) {
+        let kinds = link.events().iter().rev().map(|e| EventKind::from_number(e.kind));
+        let is_of_seeds = |kind: &Option<EventKind>| {
+            matches!(
+                kind,
+                Some(EventKind::Reset | EventKind::SeedDropped | EventKind::SceneLoaded)
+            )
+        };
+        let was_reset = kinds.into_iter().find(is_of_seeds) == Some(Some(EventKind::Reset));
+        if !was_reset || !self.seeds.is_empty() {
+            self.removed = 0;
+        } else if before > 0 {
+            self.removed = before;
+        }
+    }
+}
 
 /// Error of a placed seed relative to the planned one.
 #[derive(Clone, Copy, Debug, PartialEq)]

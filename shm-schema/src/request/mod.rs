@@ -53,7 +53,7 @@ pub enum Request {
     Reset = 7,
     /// Run a built-in scene, by its index in [`crate::BUILTIN_SCENES`].
     LoadBuiltinScene(u32) = 8,
-    /// Remove the last seed.
+    /// Remove the last seed. After a reset, restore the seeds that it removed, until another is dropped.
     UndoSeed = 9,
     /// End `rt-core`.
     Shutdown = 10,

@@ -58,7 +58,13 @@ fn what_removes_seeds_says_so_and_waits_for_the_answer() {
             "{action:?}"
         );
         drawn.place("Keep the implant (N)");
-        assert!(drawn.frame().place("This removes 5 seeds from the tissue, which cannot be undone. Plan and debrief are saved under out/ first.").is_some());
+        let undone = match action {
+            Action::Send(Request::Reset) => "Ctrl+Z restores the seeds until the next one is dropped.",
+            _ => "This cannot be undone.",
+        };
+        let text =
+            format!("This removes 5 seeds from the tissue. {undone} Plan and debrief are saved under out/ first.");
+        drawn.place(&text);
         drawn.app.act(Action::Answer(false), &ctx);
         assert!(drawn.app.question.is_none() && drawn.app.run.is_none());
         drawn.app.shown = one_needle(0.0, 0);
@@ -72,4 +78,22 @@ fn what_removes_seeds_says_so_and_waits_for_the_answer() {
     drawn.app.shown.continues_at = Some((1, 3));
     drawn.app.act(Action::RunAll, &ctx);
     assert!(drawn.app.question.is_none() && drawn.app.run.is_some());
+}
+
+#[test]
+fn another_scene_asks_while_the_needle_is_in_the_tissue() {
+    let mut drawn = Drawn::new([1280.0, 720.0], 1.0);
+    let ctx = drawn.ctx.clone();
+    for action in [
+        Action::LoadBuiltinScene(0),
+        Action::LoadScene(PathBuf::from("other.nrrd")),
+    ] {
+        drawn.app.shown = one_needle(0.03, 0);
+        drawn.app.act(action, &ctx);
+        drawn.place("The needle is in the tissue: another scene ends the insertion.");
+        drawn.app.act(Action::Answer(false), &ctx);
+    }
+    // A reset only takes the needle's contact back.
+    drawn.app.act(Action::Send(Request::Reset), &ctx);
+    assert!(drawn.app.question.is_none());
 }

@@ -12,9 +12,10 @@ pub(super) mod scene;
 
 use crate::action::Action;
 use crate::recent::Recent;
-use crate::shown::{SeedError, Shown, own_errors};
+use crate::shown::{Note, SeedError, Shown, own_errors};
 use crate::theme;
 use crate::theme::Press;
+use crate::words::counted;
 use egui::text::LayoutJob;
 use egui::{Align2, Button, FontId, RichText, Sense, Stroke, TextStyle, Vec2};
 pub use guide::Guide;
@@ -106,7 +107,13 @@ pub fn foot_height(ui: &egui::Ui) -> f32 {
 pub fn foot_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     ui.add_space(theme::GAP);
     force_ui(ui, shown, actions);
-    let Some(note) = &shown.note else { return };
+    let kept = (shown.removed > 0).then(|| {
+        let seeds = counted(shown.removed, "seed");
+        Note::done(format!("Ctrl+Z restores the {seeds} of before the reset."))
+    });
+    let Some(note) = shown.note.as_ref().or(kept.as_ref()) else {
+        return;
+    };
     let tokens = theme::of(ui);
     let color = if note.refused { tokens.bad } else { tokens.weak };
     let font = TextStyle::Small.resolve(ui.style());
@@ -309,7 +316,7 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         actions.extend(pressed.then_some(Action::Send(Request::Disengage)));
         let reset = Press(
             "Reset",
-            "Returns the tissue to rest, removes the seeds, and clears peaks and worst cases",
+            "Returns the tissue to rest, removes the seeds, and clears peaks and worst cases; Ctrl+Z restores the seeds",
         )
         .ui(ui, live);
         actions.extend(reset.then_some(Action::Send(Request::Reset)));

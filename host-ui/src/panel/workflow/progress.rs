@@ -176,8 +176,8 @@ pub fn is_at_next_seed(shown: &Shown) -> bool {
     needle_at_hand(shown).is_some_and(|needle| needle.is_at_next_drop())
 }
 
-/// Returns the action of Ctrl+Z: it restores a discarded plan, or undoes the last seed, or else the
-/// plan while the needle is outside.
+/// Returns the action of Ctrl+Z: it restores a discarded plan, or undoes the last seed, or a reset, or else the plan
+/// while the needle is outside.
 pub fn undo_action(shown: &Shown) -> Option<Undo> {
     if !shown.is_live() {
         None
@@ -185,6 +185,8 @@ pub fn undo_action(shown: &Shown) -> Option<Undo> {
         Some(Undo::Discard)
     } else if !shown.own_seeds().is_empty() {
         Some(Undo::Seed)
+    } else if shown.removed > 0 {
+        Some(Undo::Reset)
     } else if shown.plan.is_some() && !shown.has_punctured() {
         Some(Undo::Plan)
     } else {
@@ -195,6 +197,8 @@ pub fn undo_action(shown: &Shown) -> Option<Undo> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Undo {
     Seed,
+    /// Restores the seeds that the last reset removed.
+    Reset,
     Plan,
     /// Restores the plan of many needles that was discarded.
     Discard,
@@ -259,6 +263,11 @@ mod tests {
     fn undo_removes_a_seed_then_the_plan() {
         assert_eq!(undo_action(&shown(0.02, &[0.03])), Some(Undo::Seed));
         assert_eq!(undo_action(&shown(0.0, &[])), Some(Undo::Plan));
+        let after_reset = Shown {
+            removed: 83,
+            ..shown(0.0, &[])
+        };
+        assert_eq!(undo_action(&after_reset), Some(Undo::Reset));
         assert_eq!(undo_action(&shown(0.02, &[])), None);
         assert_eq!(undo_action(&Shown::empty("lab")), None);
     }

@@ -22,6 +22,7 @@ use stylet_sim::scene::{Labels, SceneSource, TissueKind};
 mod left;
 mod motion;
 mod probe;
+mod reset;
 
 /// The loops with their tapes, and the archive of the control thread.
 struct Recorded {

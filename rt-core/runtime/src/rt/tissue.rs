@@ -40,6 +40,8 @@ pub struct TissueLoop {
     world: Box<World>,
     state: TissueState,
     seeds: Vec<Seed>,
+    /// Seeds that the last reset removed, until another is dropped.
+    removed: Vec<Seed>,
     /// Columns of the prepared line.
     line: Option<Box<BodyLine>>,
     /// Columns of needles that stay in, and all of their loads in this tick.
@@ -81,6 +83,7 @@ impl TissueLoop {
             world,
             state: TissueState::default(),
             seeds: Vec::with_capacity(MAX_SEEDS),
+            removed: Vec::with_capacity(MAX_SEEDS),
             line: None,
             left: Vec::with_capacity(MAX_LEFT),
             left_loads: LeftLoads::default(),
@@ -267,7 +270,7 @@ impl TissueLoop {
         self.world.tissue.return_to_rest();
         self.last_carry.forget();
         self.reset_probe();
-        self.seeds.clear();
+        self.remove_seeds();
         self.end_contact();
         self.state.response.worst_residual = 0.0;
         self.state.response.worst_work_ns = 0;
@@ -296,6 +299,7 @@ impl TissueLoop {
         self.drop_probe();
         self.leave_line();
         self.seeds.clear();
+        self.removed.clear();
         self.state.response.seed_count = 0;
         self.end_contact();
     }

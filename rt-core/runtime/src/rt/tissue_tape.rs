@@ -99,6 +99,8 @@ pub struct TissueMemory {
     pub state: TissueState,
     /// Seeds in the tissue.
     pub seeds: Vec<Seed>,
+    /// Seeds that the last reset removed, until another is dropped.
+    pub removed: Vec<Seed>,
     /// Needles that stay in: the loads behind each one's share of the body.
     pub left: Vec<NeedleLoads>,
     /// The probe.
@@ -170,6 +172,7 @@ impl TissueTape {
         let memory = || TissueMemory {
             state: TissueState::default(),
             seeds: Vec::with_capacity(MAX_SEEDS),
+            removed: Vec::with_capacity(MAX_SEEDS),
             left: Vec::with_capacity(MAX_LEFT),
             probe: ProbeMemory::default(),
             limits: world.limits.clone(),

@@ -14,6 +14,7 @@ impl TissueLoop {
     fn copy_memory(&self, to: &mut TissueMemory) {
         to.state = self.state;
         to.seeds.clone_from(&self.seeds);
+        to.removed.clone_from(&self.removed);
         to.left.clear();
         to.left.extend(self.left.iter().map(|left| left.used));
         match &self.pressed {
@@ -36,6 +37,7 @@ impl TissueLoop {
         }
         self.state = memory.state;
         self.seeds.clone_from(&memory.seeds);
+        self.removed.clone_from(&memory.removed);
         self.line = line;
         self.world.set_limits(memory.limits.clone());
         self.world.migration = memory.migration;

@@ -50,6 +50,7 @@ impl TissueLoop {
             Some((line, front_m)) => self.material_on_line(&line, front_m - SEED_LENGTH_M),
             None => self.locate(&(tip_m - direction * SEED_LENGTH_M), Some(tip.element)),
         };
+        self.removed.clear();
         // Room for MAX_SEEDS was reserved: this push does not allocate.
         self.seeds.push(Seed {
             tip,
@@ -144,10 +145,22 @@ impl TissueLoop {
         self.seeds.iter().map(|seed| seed.tip.position_m(&body)).collect()
     }
 
+    /// Removes the last seed; after a reset, restores those that it removed.
     pub(super) fn undo_seed(&mut self) -> Result<(), RefusalCode> {
-        self.seeds.pop().ok_or(RefusalCode::NoSeedToUndo)?;
+        if self.seeds.pop().is_none() {
+            std::mem::swap(&mut self.seeds, &mut self.removed);
+            self.seeds.last().ok_or(RefusalCode::NoSeedToUndo)?;
+        }
         self.state.response.seed_count = self.seeds.len() as u32;
         Ok(())
+    }
+
+    /// Removes all seeds; [`Self::undo_seed`] restores them until another is dropped.
+    pub(super) fn remove_seeds(&mut self) {
+        if !self.seeds.is_empty() {
+            std::mem::swap(&mut self.seeds, &mut self.removed);
+        }
+        self.seeds.clear();
     }
 }
 
