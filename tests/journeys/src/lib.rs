@@ -5,6 +5,8 @@
 mod products;
 #[cfg(test)]
 mod simulator;
+#[cfg(test)]
+mod tutorials;
 
 #[cfg(test)]
 use serde_json::Value;
