@@ -101,7 +101,7 @@ fn sample(tip_in_scene_m: [f64; 3], world_from_tool: [f64; 4], buttons: u32) -> 
 
 /// Columns of both tables.
 const TICK: &str = "session_id,tick,due_ns,wake_latency_ns,force_written_ns,work_ns,missed,phase,fault,flags,\
-    tip_x_m,tip_y_m,tip_z_m,force_x_n,force_y_n,force_z_n,depth_m,speed_m_per_s,\
+    tip_x_m,tip_y_m,tip_z_m,force_x_n,force_y_n,force_z_n,past_membrane_m,speed_m_per_s,\
     membrane_n,guide_n,damping_n,friction_n,gravity_n,tissue_tick,tool_i,tool_j,tool_k,tool_w,buttons,\
     deflection_x_m,deflection_y_m,deflection_z_m,missing_before,session_begins";
 const SECOND: &str = "session_id,tick,due_ns,wake_latency_ns,force_written_ns,work_ns,missed,fault,flags,buttons,\

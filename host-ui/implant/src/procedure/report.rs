@@ -281,7 +281,10 @@ fn session(s: &Session) -> Value {
 }
 
 fn force_csv(file: &mut impl Write, direction: [f64; 3], seen: &Observations) -> std::io::Result<()> {
-    writeln!(file, "time_s,tick,depth_mm,speed_mm_s,force_n,phase,tissue_tick")?;
+    writeln!(
+        file,
+        "time_s,tick,past_membrane_mm,speed_mm_s,force_n,phase,tissue_tick"
+    )?;
     let begin = seen.records.first().map_or(0, |r| r.due_ns);
     for r in &seen.records {
         writeln!(
