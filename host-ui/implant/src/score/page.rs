@@ -72,7 +72,7 @@ fn moments(score: &Score) -> Markup {
     html! {
         @if !rows.is_empty() {
             h2 { "Marks, exercises and faults" }
-            (parts::table(&["Time (s)", "what", "words"], &rows, &[Column::Number]))
+            (parts::table(&["Time (s)", "event", "details"], &rows, &[Column::Number]))
         }
     }
 }
@@ -102,8 +102,8 @@ fn cards(score: &Score) -> Markup {
     };
     let all = [
         (
-            format!("{:.1} mm", mean * 1e3),
-            format!("mean seed error, worst {:.1} mm", worst * 1e3),
+            format!("{:.2} mm", mean * 1e3),
+            format!("mean distance of a seed from its plan, worst {:.2} mm", worst * 1e3),
         ),
         (
             both(" D90 ", 0, "Gy"),
@@ -120,7 +120,11 @@ fn cards(score: &Score) -> Markup {
         ),
         (
             clock(m.duration_s),
-            format!("{} insertions, {} re-insertions", m.insertions, m.reinsertions),
+            format!(
+                "{}, {}",
+                counted(m.insertions, "insertion"),
+                counted(m.reinsertions, "re-insertion")
+            ),
         ),
     ];
     let bent = (m.deflection_m > 0.0).then(|| {
@@ -138,7 +142,14 @@ fn cards(score: &Score) -> Markup {
 }
 
 fn clock(seconds: f64) -> String {
-    format!("{}:{:04.1} min", (seconds / 60.0) as u64, seconds % 60.0)
+    match (seconds / 60.0) as u64 {
+        0 => format!("{seconds:.1} s"),
+        minutes => format!("{minutes} min {:.0} s", (seconds % 60.0).floor()),
+    }
+}
+
+fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Returns every measure of every structure, planned next to delivered.
