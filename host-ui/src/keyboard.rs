@@ -1,7 +1,8 @@
 //! Keys: their list, and those held or pressed in this frame.
 
 use crate::action::{Action, ProbeAction, TraineeAction, Viewpoint};
-use egui::{Key, Modifiers};
+use crate::view::free::BANNERS;
+use egui::{Key, LayerId, Modifiers, Order};
 use stylet_shm_schema::Request;
 
 /// Every key with its function, for the overlay and the manual.
@@ -91,7 +92,7 @@ pub fn read(ctx: &egui::Context) -> Keys {
             }
         });
     }
-    if ctx.memory(|m| m.focused().is_some()) {
+    if ctx.memory(|m| m.focused().is_some()) || dialog_has_keys(ctx) {
         return keys;
     }
     let pressed = [
@@ -149,6 +150,21 @@ pub fn read(ctx: &egui::Context) -> Keys {
     keys
 }
 
+/// Returns whether a dialog was clicked last and is still open: after its last field lost the focus, a letter that is
+/// meant for it must not turn the force on. A click beside it, or Esc, returns the keys to the needle.
+fn dialog_has_keys(ctx: &egui::Context) -> bool {
+    let clicked = egui::Id::unique("layer that was clicked last");
+    if let Some(at) = ctx.input(|i| i.pointer.any_pressed().then(|| i.pointer.interact_pos()).flatten()) {
+        let layer = ctx.layer_id_at(at);
+        ctx.data_mut(|d| d.insert_temp(clicked, layer));
+    }
+    let layer: Option<LayerId> = ctx.data(|d| d.get_temp(clicked)).flatten();
+    let is_dialog = |layer: &LayerId| layer.order == Order::Middle && layer.id != egui::Id::unique(BANNERS);
+    layer
+        .filter(is_dialog)
+        .is_some_and(|layer| ctx.memory(|m| m.areas().is_visible(&layer)))
+}
+
 fn fresh_press(input: &egui::InputState, modifiers: Modifiers, wanted: Key) -> bool {
     input.events.iter().any(|event| {
         matches!(event, egui::Event::Key { key, pressed: true, repeat: false, modifiers: held, .. }
@@ -169,6 +185,59 @@ mod tests {
         };
         let _ = ctx.run_ui(input, |ui| keys = read(ui.ctx()));
         keys
+    }
+
+    /// Guards against letters typed after a value in *Parameters*, which turned the force on.
+    #[test]
+    fn a_dialog_that_was_clicked_keeps_the_keys_until_a_click_beside_it() {
+        let ctx = egui::Context::default();
+        let frame = |events: Vec<Event>, open: bool| {
+            let mut keys = Keys::default();
+            let input = RawInput {
+                events,
+                ..RawInput::default()
+            };
+            let _ = ctx.run_ui(input, |ui| {
+                keys = read(ui.ctx());
+                egui::Window::new("dialog")
+                    .fixed_pos([100.0, 100.0])
+                    .show(ui.ctx(), |ui| ui.label("a value"));
+                if !open {
+                    ui.ctx().memory_mut(|m| m.reset_areas());
+                }
+            });
+            keys.actions
+        };
+        let press = |at: [f32; 2]| {
+            let button = |pressed| Event::PointerButton {
+                pos: at.into(),
+                button: egui::PointerButton::Primary,
+                pressed,
+                modifiers: Modifiers::NONE,
+            };
+            vec![Event::PointerMoved(at.into()), button(true), button(false)]
+        };
+        let e = || {
+            let key = |pressed| Event::Key {
+                key: Key::E,
+                physical_key: None,
+                pressed,
+                repeat: false,
+                modifiers: Modifiers::NONE,
+            };
+            vec![key(true), key(false)]
+        };
+        for _ in 0..3 {
+            frame(Vec::new(), true);
+        }
+        assert_eq!(frame(e(), true), [Action::Send(Request::Engage)], "nothing was clicked");
+        frame(press([110.0, 110.0]), true);
+        assert_eq!(frame(e(), true), []);
+        frame(press([20.0, 20.0]), true);
+        assert_eq!(frame(e(), true), [Action::Send(Request::Engage)], "beside it");
+        frame(press([110.0, 110.0]), true);
+        frame(Vec::new(), false);
+        assert_eq!(frame(e(), true), [Action::Send(Request::Engage)], "it was closed");
     }
 
     #[test]
