@@ -5,6 +5,7 @@ mod preset;
 use crate::shown::Shown;
 use crate::theme;
 use egui::{Button, DragValue, RichText};
+use std::cell::Cell;
 use std::path::Path;
 use stylet_base::format;
 use stylet_host::link::Answer;
@@ -17,6 +18,8 @@ enum RowNote {
     None,
     InForce(u64),
     Refused(&'static str),
+    /// A number that was typed is beyond the limits, and not in force.
+    Beyond(f64),
 }
 
 /// State of the dialog. One change at a time is under way; edits made meanwhile go with the next.
@@ -254,8 +257,14 @@ fn row_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, index: 
     let (low, high) = (spec.min * scale, spec.max * scale);
     let label = column(ui, 165.0, spec.label.into()).on_hover_text(format!("{}\n{}", spec.help, spec.key));
     let mut displayed = value * scale;
+    let beyond = Cell::new(None);
     let drag = DragValue::new(&mut displayed)
         .range(low..=high)
+        .custom_parser(|text| {
+            let value = typed(text, spec.unit)?;
+            beyond.set((!(low..=high).contains(&value)).then_some(value));
+            Some(value)
+        })
         .speed((high - low) * 0.002)
         .max_decimals(4)
         .update_while_editing(false)
@@ -268,7 +277,9 @@ fn row_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, index: 
         .add_enabled_ui(shown.is_live(), |ui| ui.add_sized([124.0, 22.0], drag))
         .inner;
     let response = response.labelled_by(label.id).on_hover_text(spec.help);
-    if response.changed() {
+    if let Some(value) = beyond.get() {
+        state.notes[index] = RowNote::Beyond(value);
+    } else if response.changed() {
         state.edit(index, (displayed / scale).clamp(spec.min, spec.max));
     }
     column(ui, 95.0, theme::small(format!("{} to {}", plain(low), plain(high))));
@@ -303,6 +314,10 @@ fn note_ui(ui: &mut egui::Ui, state: &ParametersState, index: usize) {
                     .small()
                     .color(theme::of(ui).good),
             );
+        }
+        RowNote::Beyond(value) => {
+            let text = format!("{} is beyond the limits; not changed", plain(*value));
+            ui.label(RichText::new(text).small().color(theme::of(ui).bad));
         }
         RowNote::Refused(why) => {
             let text = RichText::new("refused").small().color(theme::of(ui).bad);
@@ -350,6 +365,12 @@ fn foot_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState) {
         let color = if *refused { tokens.bad } else { tokens.good };
         ui.label(RichText::new(text).color(color));
     }
+}
+
+/// Reads a number that was typed, with or without its unit.
+fn typed(text: &str, unit: &str) -> Option<f64> {
+    let text = text.trim().trim_end_matches(unit).trim();
+    text.replace('\u{2212}', "-").replace(',', ".").parse().ok()
 }
 
 /// Formats a value with as few digits as needed.
