@@ -204,6 +204,29 @@ impl ProbeView {
         let at: Pos2 = free.left_top() + Vec2::new(9.0, 6.0);
         let text = format!("{name}\n{whose}  {way}  {turn:.1}°");
         painter.text(at, Align2::LEFT_TOP, text, FontId::proportional(12.5), IMAGE.text);
+        if let Some(remedy) = outside(&pose, scene) {
+            let text = format!("The probe is outside the body.\n{remedy}");
+            let font = FontId::proportional(13.5);
+            painter.text(rect.center(), Align2::CENTER_CENTER, text, font, IMAGE.text);
+        }
+    }
+}
+
+/// Returns what moves the probe back to the body, if no part of the body is beside it.
+fn outside(pose: &Pose, scene: &SceneHeader) -> Option<&'static str> {
+    let along = |corner: usize| {
+        let ends = [scene.lower_m, scene.upper_m];
+        let place_m = Vector3::from([0, 1, 2].map(|a| ends[corner >> a & 1][a]));
+        (place_m - pose.middle_m).dot(&pose.axis)
+    };
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    for off_m in (0..8).map(along) {
+        (least, most) = (least.min(off_m), most.max(off_m));
+    }
+    match (least > 0.0, most < 0.0) {
+        (true, _) => Some("PgUp moves it in."),
+        (_, true) => Some("PgDn moves it out."),
+        _ => None,
     }
 }
 
@@ -251,4 +274,25 @@ fn pixels(rect: Rect, per_point: f32) -> [u32; 2] {
     let size = rect.size() * per_point;
     let share = (LARGEST_SIDE / size.max_elem().max(1.0)).min(1.0);
     [size.x, size.y].map(|side| ((side * share).round() as u32).max(16))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    #[test]
+    fn a_probe_outside_the_body_says_which_way_is_in() {
+        let mut scene = SceneHeader::zeroed();
+        (scene.lower_m, scene.upper_m) = ([0.0; 3], [0.1; 3]);
+        let (pose, along) = (Pose::of_scene(&scene), Pose::of_scene(&scene).axis);
+        let moved = |m: f64| Pose {
+            middle_m: Vector3::from([0.05; 3]) + along * m,
+            ..pose
+        };
+        assert_eq!(outside(&moved(0.0), &scene), None);
+        assert_eq!(outside(&moved(0.049), &scene), None);
+        assert_eq!(outside(&moved(-0.06), &scene), Some("PgUp moves it in."));
+        assert_eq!(outside(&moved(0.06), &scene), Some("PgDn moves it out."));
+    }
 }
