@@ -17,7 +17,7 @@ use stylet_implant::score::Trace;
 /// Height of the parts under the plots over time, and of the title over each.
 const UNDER_PLOTS: f32 = 432.0;
 const TITLE: f32 = 20.0;
-const PLOT_HEIGHTS: [f32; 2] = [48.0, 150.0];
+const PLOT_HEIGHTS: [f32; 2] = [48.0, 190.0];
 /// Height of a line on unseen ticks.
 const SEEN_LINE: f32 = 20.0;
 /// Height of the line of the second device.

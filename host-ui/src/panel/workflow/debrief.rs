@@ -11,13 +11,7 @@ use egui_plot::{Line, PlotPoints, VLine};
 use stylet_base::format;
 use stylet_shm_schema::touching;
 
-/// Height of the visible rows of the seed table; the others scroll.
-const TABLE_HEIGHT: f32 = 150.0;
-
 pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
-    seeds_ui(ui, shown, &all_errors(shown));
-    updates_ui(ui, shown);
-    dose_ui(ui, shown, 60.0, "The dose is computed once seeds lie in the tissue.");
     let save = ui.add_enabled(!shown.seeds.is_empty(), egui::Button::new("Save the debrief"));
     if save
         .on_hover_text("A page and its figures: debrief.html and score.json, in a new folder under out/")
@@ -25,6 +19,9 @@ pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     {
         actions.push(Action::SaveDebrief);
     }
+    dose_ui(ui, shown, 60.0, "The dose is computed once seeds lie in the tissue.");
+    updates_ui(ui, shown);
+    seeds_ui(ui, shown, &all_errors(shown));
 }
 
 /// Draws one line for each update of the plan: the distance of its contour from the true gland.
@@ -152,22 +149,15 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
     if touching > 0 {
         ui.label(theme::small(format!("{touching} seeds touch another one")));
     }
-    egui::ScrollArea::vertical()
-        .id_salt("seed errors")
-        .max_height(TABLE_HEIGHT)
-        .show(ui, |ui| {
-            ui.spacing_mut().interact_size.y = 16.0;
-            egui::Grid::new("seed errors")
-                .num_columns(4)
-                .striped(true)
-                .min_col_width(52.0)
-                .spacing([8.0, 2.0])
-                .show(ui, |ui| {
-                    theme::heads(ui, ["seed", "along", "across", "total"]);
-                    rows.iter()
-                        .for_each(|(needle, row)| seed_row_ui(ui, has_many.then_some(*needle), row));
-                });
-        });
+    // The list is last and does not scroll by itself, so that the wheel moves the whole panel.
+    ui.spacing_mut().interact_size.y = 16.0;
+    let grid = egui::Grid::new("seed errors").num_columns(4).striped(true);
+    grid.min_col_width(52.0).spacing([8.0, 2.0]).show(ui, |ui| {
+        theme::heads(ui, ["seed", "along", "across", "total"]);
+        for (needle, row) in rows {
+            seed_row_ui(ui, has_many.then_some(*needle), row);
+        }
+    });
 }
 
 /// Formats mean and largest error; `None` while no seed of the list is placed.
