@@ -68,7 +68,7 @@ pub fn microseconds(value: Option<f64>) -> String {
     match value {
         None => "n/a".to_owned(),
         Some(us) if us >= 1000.0 => format!("{:.1} ms", us * 1e-3),
-        Some(us) => format!("{us:.1} us"),
+        Some(us) => format!("{us:.1} µs"),
     }
 }
 

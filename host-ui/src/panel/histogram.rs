@@ -84,7 +84,7 @@ fn decade(us: f64) -> String {
     if us >= 999.0 {
         format!("{:.0} ms", us * 1e-3)
     } else {
-        format!("{us:.0} us")
+        format!("{us:.0} µs")
     }
 }
 
@@ -99,9 +99,9 @@ mod tests {
         timing.work_histogram[5] = 1;
         assert_eq!(
             bin_text(&timing, 5),
-            "10.0 us to 15.8 us\nticks by wake-up: 1 234\nticks by work: 1"
+            "10.0 µs to 15.8 µs\nticks by wake-up: 1 234\nticks by work: 1"
         );
-        assert!(bin_text(&timing, 0).starts_with("Below 1.6 us"));
+        assert!(bin_text(&timing, 0).starts_with("Below 1.6 µs"));
         assert!(bin_text(&timing, BINS - 1).starts_with("63.1 ms and more"));
     }
 

@@ -83,12 +83,12 @@ pub fn plots_ui(
     let worst = now(shown
         .state
         .map(|s| format::microseconds(Some(format::us(s.worst_wake_ns)))));
-    title(ui, "Wake-up latency, us", &format!("worst {worst}"), tokens.wake).explained("wake-up latency");
+    title(ui, "Wake-up latency, µs", &format!("worst {worst}"), tokens.wake).explained("wake-up latency");
     recent(
         ui,
         "wake-up latency",
         tokens.wake,
-        ("us", 1),
+        ("µs", 1),
         [0.0, 50.0],
         Quantity::WakeUs,
     );
