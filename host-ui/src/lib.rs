@@ -26,3 +26,5 @@ mod shown;
 mod theme;
 pub mod view;
 mod words;
+
+pub use theme::colors_of_lines;

@@ -5,7 +5,7 @@
 
 mod tokens;
 
-use egui::{CornerRadius, FontFamily, FontId, Margin, RichText, Stroke, TextStyle, Theme, Visuals};
+use egui::{Color32, CornerRadius, FontFamily, FontId, Margin, RichText, Stroke, TextStyle, Theme, Visuals};
 pub use tokens::{DARK, IMAGE, LIGHT, Tokens};
 
 pub const LEFT_WIDTH: f32 = 286.0;
@@ -20,6 +20,22 @@ pub fn of(ui: &egui::Ui) -> &'static Tokens {
 
 pub fn tokens(dark: bool) -> &'static Tokens {
     if dark { &DARK } else { &LIGHT }
+}
+
+/// Returns the colours of the lines over a slice, by their names.
+pub fn colors_of_lines() -> Vec<(String, Color32)> {
+    let i = &IMAGE;
+    let outlines = [
+        ("target", i.gland),
+        ("urethra", i.urethra),
+        ("rectum", i.rectum),
+        ("bladder", i.bladder),
+        ("bone", i.bone),
+    ];
+    let outlines = outlines.map(|(name, color)| (name.to_owned(), color));
+    let levels = i.isodose.iter().enumerate();
+    let levels = levels.map(|(level, color)| (format!("isodose line {level}"), *color));
+    outlines.into_iter().chain(levels).collect()
 }
 
 /// Installs both themes at start; a setting selects the one shown.

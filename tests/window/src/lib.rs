@@ -23,6 +23,8 @@ mod probe;
 #[cfg(test)]
 mod senders;
 #[cfg(test)]
+mod sights;
+#[cfg(test)]
 mod states;
 #[cfg(test)]
 mod terminal;
