@@ -74,6 +74,8 @@ pub enum Action {
     SaveDebrief,
     /// Marks the refusals shown so far as read.
     DismissRefusals,
+    /// Reduces the banner of a run that is not real-time to its badge.
+    ReduceNotRealTime,
     /// Marks the message about an unplugged device as read.
     DismissDisconnected,
 }

@@ -24,6 +24,9 @@ use thread::Receiver;
 pub use player::{Piece, Playback, Played, TimeMark};
 pub use received::{Answer, LinkError, LinkStatus, SceneModel, Snapshot};
 
+/// Begins the command in the reason of [`LinkStatus::Absent`], which a program that can start a core leaves out.
+pub const START_IT: &str = "Start it in another terminal";
+
 /// Longest pause of the heartbeat.
 const SILENT_AFTER: Duration = Duration::from_millis(100);
 /// Longest pause without the board, when the only heartbeat is the announcement once a second.
@@ -179,7 +182,7 @@ impl Link {
         } else {
             "no rt-core is running"
         };
-        format!("{what} (instance \"{name}\"). Start it in another terminal: rt-core{flag}")
+        format!("{what} (instance \"{name}\"). {START_IT}: rt-core{flag}")
     }
 
     /// Present run of the core.

@@ -120,6 +120,7 @@ impl App {
             Action::SavePicture => self.pictures.request(ctx),
             Action::SaveDebrief => self.save_debrief(),
             Action::StartCore => self.start_core(),
+            Action::ReduceNotRealTime => self.shown.reduced = self.shown.session.map(|s| s.session_id),
             Action::DismissDisconnected => self.shown.disconnected = None,
             Action::DismissRefusals => {
                 if let Some(session) = &self.shown.session {

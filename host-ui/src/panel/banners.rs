@@ -8,7 +8,7 @@ use crate::theme::Tokens;
 use crate::view::free::BANNERS;
 use crate::words::{capital, counted, sentence};
 use egui::{Color32, Rect, RichText};
-use stylet_host::link::LinkStatus;
+use stylet_host::link::{LinkStatus, START_IT};
 use stylet_shm_schema::{Exercise, Fault, Relayed, Request};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,7 +108,8 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
         list.push(banner.with("Re-arm", Action::Send(Request::Engage)));
     }
     list.extend(of_second(shown));
-    if shown.state.is_some() && !shown.is_real_time() {
+    let is_reduced = shown.reduced.is_some() && shown.reduced == shown.session.map(|s| s.session_id);
+    if shown.state.is_some() && !shown.is_real_time() && !is_reduced {
         list.push(not_real_time(shown));
     }
     if shown.state.is_some() && fault == Some(Fault::None) {
@@ -235,17 +236,18 @@ fn refused(shown: &Shown) -> Option<Banner> {
 }
 
 fn absent(shown: &Shown, why: &str) -> Banner {
-    let text = if why.is_empty() {
-        format!(
-            "Start it here, or in a terminal: rt-core --instance {}. Step 1 has a recorded example.",
-            shown.instance
-        )
-    } else {
-        format!("{}{}", what_ended(shown), sentence(why))
+    let can_start = !shown.reads_recording && shown.relayed.is_none();
+    let said = match can_start {
+        true => why.split(START_IT).next().unwrap_or_default().trim(),
+        false => why,
     };
+    let mut text = what_ended(shown) + &sentence(said.trim_end_matches('.'));
+    if can_start && shown.session.is_none() {
+        text += " Step 1 has a recorded example, which needs none.";
+    }
     let banner = Banner::new(BannerLevel::Bad, "The simulator core is not running", text);
     match shown.session {
-        _ if shown.reads_recording || shown.relayed.is_some() => banner,
+        _ if !can_start => banner,
         Some(_) => banner.with("Start it again", Action::StartCore),
         None => banner.with("Start it", Action::StartCore),
     }
@@ -267,15 +269,21 @@ fn what_ended(shown: &Shown) -> String {
     fault + &kept
 }
 
-fn not_real_time(shown: &Shown) -> Banner {
+/// Returns what takes real time from the run, and what to do.
+pub fn not_real_time_words(shown: &Shown) -> String {
     let advice = shown.session.map(|s| s.advice.read()).unwrap_or_default();
     let asked = shown.session.is_some_and(|s| s.no_rt_asked != 0);
-    let text = match (advice.trim(), asked) {
-        ("", true) => "Started with --no-rt. Restart without it for real-time forces.".to_owned(),
+    match (advice.trim(), asked) {
+        (_, true) => "Started with --no-rt. Restart without it for real-time forces.".to_owned(),
         ("", false) => "Run rt-core doctor: it lists the problems and their remedies.".to_owned(),
         (advice, _) => advice.replace('\n', "  "),
-    };
-    Banner::new(BannerLevel::Warn, "Not real-time", text)
+    }
+}
+
+/// Warns of forces that may be late; on request only the badge at the top does.
+fn not_real_time(shown: &Shown) -> Banner {
+    let banner = Banner::new(BannerLevel::Warn, "Not real-time", not_real_time_words(shown));
+    banner.with("Badge only", Action::ReduceNotRealTime)
 }
 
 /// Largest share of the pictures under banners.

@@ -1,6 +1,7 @@
 //! The bar at the top: link, figures, force and settings.
 
 use crate::action::Action;
+use crate::panel::banners::not_real_time_words;
 use crate::settings::{SCALES, STRENGTHS_U, Settings, ThemeChoice};
 use crate::shown::{NeedleLine, SecondHand, Shown};
 use crate::theme;
@@ -129,12 +130,11 @@ fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
         return;
     }
     if shown.state.is_some() {
-        let (word, color) = if shown.is_real_time() {
-            ("REAL-TIME", tokens.good)
+        if shown.is_real_time() {
+            badge(ui, "REAL-TIME", tokens.good);
         } else {
-            ("not real-time", tokens.warn)
-        };
-        badge(ui, word, color);
+            badge(ui, "not real-time", tokens.warn).on_hover_text(not_real_time_words(shown));
+        }
     }
     line_ui(ui, shown);
     second_ui(ui, shown);

@@ -89,6 +89,8 @@ pub struct Shown {
     /// Gamepads and 3D mice, and whether this window has the focus that they need.
     pub controllers: Latest,
     pub has_focus: bool,
+    /// Run of the core that is not real-time, as only its badge says.
+    pub reduced: Option<u64>,
     /// Device that was unplugged, until the message is dismissed or a device is plugged in.
     pub disconnected: Option<String>,
     pub cost: FrameCost,

@@ -52,11 +52,15 @@ fn settle(window: &mut Harness<'_, App>) {
 }
 
 #[test]
-fn without_a_core_the_window_shows_the_command() {
+fn without_a_core_the_window_offers_to_start_one() {
     let mut window = window("ui-window-absent");
     settle(&mut window);
     window.get_by_label("The simulator core is not running");
-    window.get_by_label_contains("rt-core --instance ui-window-absent");
+    window.get_by_label("Start it");
+    assert!(
+        window.query_by_label_contains("rt-core --instance").is_none(),
+        "one remedy, not two"
+    );
     assert!(
         window.query_by_label("The force is off").is_none(),
         "nothing is known of the force"

@@ -15,10 +15,22 @@ fn live() -> Shown {
 }
 
 #[test]
-fn no_banner_without_a_problem_and_absence_shows_what_to_type() {
+fn no_banner_without_a_problem_and_absence_has_one_remedy() {
     assert!(banners(&live()).is_empty());
     let list = banners(&Shown::empty("lab"));
-    assert!(list[0].text.contains("rt-core --instance lab"), "{}", list[0].text);
+    assert_eq!(list[0].remedy.as_ref().map(|(name, _)| *name), Some("Start it"));
+    let mut absent = Shown::empty("lab");
+    absent.status = LinkStatus::Absent {
+        why: "no rt-core is running (instance \"lab\"). Start it in another terminal: rt-core --instance lab"
+            .to_owned(),
+    };
+    assert!(
+        !banners(&absent)[0].text.contains("terminal"),
+        "{}",
+        banners(&absent)[0].text
+    );
+    absent.reads_recording = true;
+    assert!(banners(&absent)[0].text.contains("rt-core --instance lab"));
 }
 
 /// Guards against a core that ended without a reason, and placed seeds without a message.
@@ -55,6 +67,24 @@ fn a_force_that_is_off_or_waits_and_a_refusal_each_have_their_banner() {
     shown.last_refusal = "needle.puncture_depth = 1000 mm".to_owned();
     assert_eq!(titles(&shown), ["The force is off", "Request refused"]);
     assert!(banners(&shown)[1].text.contains("puncture_depth"));
+}
+
+#[test]
+fn a_run_that_is_not_real_time_keeps_its_badge_alone_on_request() {
+    let mut shown = live();
+    if let Some(state) = &mut shown.state {
+        state.flags &= !flags::REAL_TIME;
+    }
+    let mut session = stylet_shm_schema::Session::zeroed();
+    session.session_id = 7;
+    shown.session = Some(session);
+    let is_warned = |shown: &Shown| banners(shown).iter().any(|b| b.title == "Not real-time");
+    assert!(is_warned(&shown));
+    shown.reduced = Some(7);
+    assert!(!is_warned(&shown));
+    session.session_id = 8;
+    shown.session = Some(session);
+    assert!(is_warned(&shown), "another run");
 }
 
 #[test]
