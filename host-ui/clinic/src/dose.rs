@@ -154,7 +154,7 @@ impl DoseArgs {
                 fit: None,
             };
             let column = Column::of(&implant, kernel, state, None);
-            write_whole(&c.out.join("report.html"), sheet::page(&implant, &[column]).as_bytes())?;
+            write_whole(&c.out.join("report.html"), sheet::page(&implant, &[column])?.as_bytes())?;
         }
         if points.is_none() && judged.is_none() {
             let grid = grid(seeds, kernel, self.spacing_mm * 1e-3, None)?;

@@ -230,7 +230,10 @@ impl PostImplantArgs {
         let names: Vec<&str> = columns.iter().map(|c| c.name.as_str()).collect();
         let rows = sheet::rows(implant, columns);
         write::figures(&out.join("post_implant.csv"), &names, &rows)?;
-        write_whole(&out.join("post_implant.html"), sheet::page(implant, columns).as_bytes())?;
+        write_whole(
+            &out.join("post_implant.html"),
+            sheet::page(implant, columns)?.as_bytes(),
+        )?;
         print!(
             "{}",
             stylet_base::format::printable_table(&write::figure_table(&names, &rows))

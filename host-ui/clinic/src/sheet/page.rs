@@ -2,11 +2,16 @@
 
 use super::figures::{DEFINITIONS, NotComputed, Row, rows};
 use super::{Column, Implant};
-use maud::{Markup, html};
+use maud::{Markup, PreEscaped, html};
+use stylet_anatomy::Organ;
 use stylet_base::format::printable;
 use stylet_dose::decay::s_to_days;
 use stylet_dose::effect::Response;
+use stylet_dose::picture::Curve;
+use stylet_report::picture::DrawError;
 
+/// Size of the histograms, which leaves the rest on the same sheet.
+const HISTOGRAMS: (u32, u32) = (1100, 250);
 /// Most columns in portrait format.
 const UPRIGHT: usize = 3;
 
@@ -26,8 +31,8 @@ h1{font-size:13pt}h2{font-size:9pt;margin:5pt 0 1pt}tr.group td{padding-top:2.5p
 .why{font-size:6.5pt}sup{font-size:5pt}footer{font-size:6pt;margin-top:4pt;line-height:1.15}}
 ";
 
-/// Returns the page of one state or of several.
-pub fn page(implant: &Implant, columns: &[Column]) -> String {
+/// Returns the page of one state or of several; an error if its picture cannot be drawn.
+pub fn page(implant: &Implant, columns: &[Column]) -> Result<String, DrawError> {
     let size = if columns.len() > UPRIGHT {
         "landscape"
     } else {
@@ -35,6 +40,7 @@ pub fn page(implant: &Implant, columns: &[Column]) -> String {
     };
     let print = format!("@page{{size:A4 {size};margin:9mm}}");
     let sectors = columns.iter().any(|c| !c.sectors.is_empty());
+    let histograms = histograms(implant, columns)?;
     let main = html! {
         h1 { "Dose of a permanent implant (AAPM TG-137)" }
         (head(implant, columns))
@@ -44,6 +50,12 @@ pub fn page(implant: &Implant, columns: &[Column]) -> String {
                 div { h2 { "Sectors of the target: D90 (Gy) and V100 (%)" } (of_sectors(columns)) (fits(columns)) }
             }
         }
+        @if let [first, .., last] = columns {
+            h2 { "Dose-volume histograms: " (last.name) " solid, " (first.name) " dashed" }
+        } @else {
+            h2 { "Dose-volume histograms" }
+        }
+        (PreEscaped(histograms))
         footer {
             @for line in DEFINITIONS { p { (line) } }
             p { (super::sectors::CUTS) }
@@ -51,11 +63,30 @@ pub fn page(implant: &Implant, columns: &[Column]) -> String {
             p { "Made by a simulator for research and training. Not a medical device: no treatment may rest on it." }
         }
     };
-    stylet_report::page(
+    Ok(stylet_report::page(
         &format!("Implant: {}", printable(&implant.title)),
         &format!("{SHEET}{print}"),
         &main,
-    )
+    ))
+}
+
+/// Draws target, urethra and rectum of the last state, and dashed of the first one.
+fn histograms(implant: &Implant, columns: &[Column]) -> Result<String, DrawError> {
+    let organs = |column: &Column| {
+        let organ = |organ| column.organ(organ).cloned();
+        [column.target().cloned(), organ(Organ::Urethra), organ(Organ::Rectum)]
+    };
+    let (first, last) = (columns.first().map(organs), columns.last().map(organs));
+    let (first, last) = (first.unwrap_or_default(), last.unwrap_or_default());
+    let pairs = ["target", "urethra", "rectum"].into_iter().zip(last.iter().zip(&first));
+    let curves = pairs.filter_map(|(name, (last, first))| {
+        Some(Curve {
+            name,
+            dvh: last.as_ref()?,
+            planned: first.as_ref().filter(|_| columns.len() > 1),
+        })
+    });
+    stylet_dose::picture::dvh(HISTOGRAMS, &curves.collect::<Vec<_>>(), implant.prescription_gy)
 }
 
 fn head(implant: &Implant, columns: &[Column]) -> Markup {

@@ -63,7 +63,11 @@ fn the_page_has_every_figure_or_its_reason() {
     // Seen swollen on day 0, the gland gets more once it has shrunk.
     assert!(value("target", "D90", 1).unwrap() > 1.05 * value("target", "D90", 0).unwrap());
     assert!(value("effect", "BED of target D90", 1).is_err());
-    let page = page(&implant, &columns);
+    let page = page(&implant, &columns).unwrap();
+    let histograms = &page[page
+        .find("Dose-volume histograms: planned, edema solid, planned dashed")
+        .unwrap()..];
+    assert!(histograms.contains("<svg") && histograms.contains("urethra") && !histograms.contains(">rectum<"));
     assert!(page.contains("@page{size:A4 portrait") && page.contains("case &lt;1&gt;"));
     assert!(page.contains("not computed: no structure is called rectum"));
     // Guards against the same sentence in seven cells, which made every other column as wide.
