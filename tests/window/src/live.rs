@@ -3,6 +3,7 @@
 //! Its picture is the README's; `make picture` keeps it.
 
 use crate::driven::{Driven, keep_for_docs, options_of};
+use egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use host_ui::app::App;
@@ -199,4 +200,42 @@ fn differing_pixels(a: &image::RgbaImage, b: &image::RgbaImage) -> usize {
         .zip(b.pixels())
         .filter(|(a, b)| a.0.iter().zip(b.0).any(|(x, y)| x.abs_diff(y) > 24))
         .count()
+}
+
+/// Guards against values that were clamped in silence.
+#[test]
+fn a_value_beyond_its_limits_is_named_and_not_taken() {
+    let mut driven = Driven::open_plain([1280.0, 800.0]);
+    let set = |driven: &Driven| driven.window.state().link().parameters().map(|p| (p.generation, p.set));
+    let before = set(&driven);
+    driven.click("Parameters");
+    driven.window.run_steps(3);
+    let field = |driven: &mut Driven, text: &str| {
+        let label = "Puncture depth u_cri";
+        driven.window.get_by_role_and_label(Role::SpinButton, label).click();
+        driven.window.run_steps(2);
+        driven
+            .window
+            .key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::A);
+        driven.window.run_steps(1);
+        driven.window.get_by(|node| node.is_focused()).type_text(text);
+        driven.window.run_steps(2);
+        driven.press(egui::Key::Enter);
+        driven.window.run_steps(5);
+    };
+    field(&mut driven, "900");
+    driven.window.get_by_label("900 is beyond the limits; not changed");
+    assert_eq!(set(&driven), before);
+    // The next letters are meant for the dialog too.
+    driven.press(egui::Key::E);
+    driven.window.run_steps(5);
+    let is_engaged = |app: &App| app.link().state().is_some_and(|s| s.flags & flags::ENGAGED != 0);
+    assert!(!is_engaged(driven.window.state()));
+    field(&mut driven, "9 mm");
+    driven.until("the change", |app| {
+        app.link()
+            .parameters()
+            .is_some_and(|p| Some(p.generation) > before.map(|(n, _)| n))
+    });
+    assert!(driven.window.query_by_label_contains("beyond the limits").is_none());
 }
