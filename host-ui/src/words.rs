@@ -51,8 +51,11 @@ pub fn sentence(text: &str) -> String {
     }
 }
 
-/// Returns the text with a capital at its start.
+/// Returns the text with a capital at its start, unless a program's name stands there.
 pub fn capital(text: &str) -> String {
+    if text.starts_with("rt-core") {
+        return text.to_owned();
+    }
     let mut chars = text.chars();
     let first = chars.next().map(|first| first.to_uppercase().to_string());
     first.unwrap_or_default() + chars.as_str()

@@ -14,7 +14,7 @@ pub(super) fn section(updates: &[Reviewed]) -> Markup {
         @if !updates.is_empty() {
             h2 { "Updates of the plan" }
             p {
-                "The gland was contoured on the live picture and the needles that were left were planned anew. Dice and distances \
+                "The gland was contoured on the live picture and the remaining needles were replanned. Dice and distances \
                  compare the contour with the true gland at that moment; doses are those of the contoured gland."
             }
             @for (number, update) in updates.iter().enumerate() { (table(number + 1, update)) }

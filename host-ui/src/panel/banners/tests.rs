@@ -46,7 +46,7 @@ fn an_ended_core_is_reported_with_reason_and_kept_seeds() {
     let text = &banners(&shown)[0].text;
     assert!(
         text.starts_with(
-            "Its last fault: the force loop has stopped. The plan and 2 seeds remain on display. Rt-core has stopped."
+            "Its last fault: the force loop has stopped. The plan and 2 seeds remain on display. rt-core has stopped."
         ),
         "{text}"
     );
