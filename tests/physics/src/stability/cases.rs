@@ -13,7 +13,7 @@ const TICK_S: f64 = 5e-3;
 const TOLERANCE: f64 = 1.001e-3;
 
 /// Cases known to fall short, and why; the page says so. A case that is met again must leave this list.
-pub const SHORT: [(u32, TissueKind, &str); 4] = [
+pub const SHORT: [(u32, TissueKind, &str); 3] = [
     (
         3,
         TissueKind::Fem,
@@ -23,11 +23,6 @@ pub const SHORT: [(u32, TissueKind, &str); 4] = [
         5,
         TissueKind::Fem,
         "as in (3): the element beside the fixed one is pushed by several elements; reported live as in (3)",
-    ),
-    (
-        7,
-        TissueKind::Fem,
-        "at 0.499, forty cycles do not always meet the tolerance within one tick; the answer follows a few ticks later",
     ),
     (
         14,
