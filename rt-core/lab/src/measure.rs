@@ -275,8 +275,9 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
             from_core: core,
         };
         let others = threads.spawn(move || others::watch(machine, looked_at, before, stop));
-        let paired =
-            (setup.witness).then(|| threads.spawn(move || paired::watch(machine, options, FORCE_THREAD, stop)));
+        let paired = setup
+            .witness
+            .then(|| threads.spawn(move || paired::watch(machine, options, FORCE_THREAD, stop)));
         let cores: Vec<_> = watched
             .into_iter()
             .flatten()

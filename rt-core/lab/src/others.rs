@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rival_is_named_only_if_it_ran_and_the_loop_waited_for_half_the_delay() {
+    fn a_rival_is_named_only_if_it_ran_and_the_loop_waited_long_enough() {
         let others = Others {
             rivals: vec![
                 ran(0, 100, 40, None),

@@ -114,7 +114,8 @@ pub fn watch(machine: &Machine, options: &Options, thread: &str, stop: &AtomicBo
     let early_ns = options.wait.early_ns;
     let grid = clock::Grid::at_phase(clock::now_ns(), period_ns, phase_ns(HAPTIC_PHASE, period_ns));
     // As the loop, it wakes early and again at the deadline; without an early wake-up both are one.
-    let event_ns = |event: u64| grid.due_ns + event / 2 * period_ns - if event % 2 == 0 { early_ns } else { 0 };
+    let event_ns =
+        |event: u64| grid.due_ns + event / 2 * period_ns - if event.is_multiple_of(2) { early_ns } else { 0 };
     let warm_ns = grid.due_ns + (WARM_UP_S * 1e9) as u64;
     // Half as late as the loop already counts.
     let late_ns = late_from_ns(period_ns) / 2;
