@@ -1,6 +1,11 @@
 //! Forces of layers that were solved before. They depend on the shape of the body and on the layers, but not on the
 //! materials of the body: the bodies of a study, of rehearsals and of a changed stiffness share them.
 
+#![allow(
+    clippy::disallowed_types,
+    reason = "a lock is held where a body is made, which no loop does"
+)]
+
 use super::cubes::Cubes;
 use super::surface::Surface;
 use crate::scene::Layer;

@@ -199,11 +199,46 @@ fn what_layers_cost_and_do_in_paper_and_pelvis() {
                 let sum: f64 = targets.iter().map(|e| f64::from(field.0[axis][*e as usize])).sum();
                 *mean = 1e3 * sum / targets.len() as f64;
             }
+            product_of_shapes(&model);
             let springs: f64 = model.levels[0].springs.iter().map(|s| f64::from(*s)).sum();
             println!(
                 "{name}, layers {is_layered}: made in {made_s:.2} s, again in {again_s:.2} s, condensed in {condensed_s:.2} s, {:.1} MB, springs {springs:.0} N/m, gland moves by {means:.4?} mm/N along x, y, z",
                 body.bytes() as f64 / 1e6
             );
         }
+    }
+}
+
+/// Prints how long a tick off a line would take to add the layers' shapes to one product of its solver.
+fn product_of_shapes(model: &FemModel<f32>) {
+    for reaction in &model.reactions {
+        let narrow = |column: &Vec<[f64; 3]>| column.iter().map(|f| f.map(|c| c as f32)).collect();
+        let columns: Vec<Vec<[f32; 3]>> = reaction.forces.iter().map(narrow).collect();
+        let mut u = vec![[1e-3_f32; 3]; reaction.nodes.len()];
+        let begun = std::time::Instant::now();
+        const TIMES: u32 = 20;
+        for _ in 0..TIMES {
+            let dot = |column: &Vec<[f32; 3]>| -> f64 {
+                let products = column
+                    .iter()
+                    .zip(&u)
+                    .map(|(f, u)| f[0] * u[0] + f[1] * u[1] + f[2] * u[2]);
+                f64::from(products.sum::<f32>())
+            };
+            let along = nalgebra::DVector::from_iterator(columns.len(), columns.iter().map(dot));
+            for (column, &share) in columns.iter().zip(&(&reaction.mix * along)) {
+                let share = 1e-9 * share as f32;
+                for (u, f) in u.iter_mut().zip(column) {
+                    (0..3).for_each(|c| u[c] -= share * f[c]);
+                }
+            }
+        }
+        println!(
+            "{} columns on {} nodes: {:.2} ms",
+            columns.len(),
+            u.len(),
+            1e3 * begun.elapsed().as_secs_f64() / f64::from(TIMES)
+        );
+        assert!(u[0][0].is_finite());
     }
 }
