@@ -19,7 +19,10 @@ pub const KEYS: [(&str, &str); 26] = [
     ("B", "brake of the probe's stepper, with --device-2"),
     ("Enter", "the main action of the present step"),
     ("Space", "drop a seed at the tip"),
-    ("Ctrl+Z", "undo the last seed, a reset or a change of the plan; with Shift redo it"),
+    (
+        "Ctrl+Z",
+        "undo the last seed, a reset or a change of the plan; with Shift redo it",
+    ),
     (
         "Arrows, Enter",
         "in the template: choose a hole, add or show its needle",
