@@ -17,7 +17,6 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stylet_anatomy::Role;
 use stylet_files::{LabelVolume, Tissue};
-use stylet_shm_schema::Instance;
 use stylet_shm_schema::*;
 use thread::Receiver;
 

@@ -27,6 +27,7 @@ mod machine;
 mod measure;
 mod others;
 mod paired;
+mod paired_section;
 mod plots;
 mod provenance;
 mod raw;

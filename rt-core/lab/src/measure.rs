@@ -7,6 +7,7 @@ use crate::load::{Load, LoadError, Running};
 use crate::machine::Machine;
 use crate::others::{self, Others};
 use crate::paired::{self, Paired};
+use crate::sample::WARM_UP_S;
 use crate::trace::{self, TraceSection, Watched};
 use crate::watch::{self, CoreWatch};
 use serde::{Deserialize, Serialize};
@@ -25,8 +26,6 @@ use stylet_runtime::rt::timing::{PoseTimes, Probe, Probes};
 use stylet_runtime::rt::tissue::TISSUE_STAGES;
 use stylet_sim::scene::{Scene, SceneError};
 
-/// Time at the start that is not recorded: caches and page tables are still filling.
-pub const WARM_UP_S: f64 = 0.5;
 /// Most windows of a report, none shorter than 100 ms.
 const WINDOWS: u64 = 240;
 const SHORTEST_WINDOW_NS: u64 = 100_000_000;

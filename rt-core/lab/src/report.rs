@@ -11,7 +11,7 @@ use crate::bound::MissBound;
 use crate::compare::Comparison;
 use crate::load::Load;
 use crate::others::Others;
-use crate::paired::PairedSection;
+use crate::paired_section::PairedSection;
 use crate::provenance::{Fact, ProgramDigest, Setting};
 use crate::spin::SpinSearch;
 use crate::stationary::Stationarity;

@@ -3,6 +3,8 @@
 use hdrhistogram::Histogram;
 use std::ops::Deref;
 
+/// Time at the start that is not recorded: caches and page tables are still filling.
+pub const WARM_UP_S: f64 = 0.5;
 /// Longest time that a histogram resolves; longer ones count as this.
 const LONGEST_NS: u64 = 10_000_000_000;
 /// Three digits: a value is known to 0.1 %.

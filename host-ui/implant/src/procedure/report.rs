@@ -93,16 +93,13 @@ fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
         .iter()
         .enumerate()
         .map(|(number, (drop, seed))| {
-            let planned = drop.planned_m;
-            let off = SeedOffset::of(planned, seed.position_m, drop.direction);
+            let off = SeedOffset::of(drop.planned_m, seed.position_m, drop.direction);
             json!({
                 "needle": drop.needle + 1, "hole": drop.hole.map(|h| h.to_string()), "strength_u": drop.strength_u,
-                "axis": seed.axis,
-                "planned_mm": mm(planned), "dropped_at_mm": mm(seed.dropped_at_m), "placed_mm": mm(seed.position_m),
-                "planned_ras_mm": to_patient(planned), "dropped_at_ras_mm": to_patient(seed.dropped_at_m),
-                "placed_ras_mm": to_patient(seed.position_m),
-                "error_mm": off.distance_m() * 1e3, "error_along_mm": off.along_m * 1e3,
-                "error_across_mm": off.across_m * 1e3,
+                "axis": seed.axis, "planned_mm": mm(drop.planned_m), "dropped_at_mm": mm(seed.dropped_at_m), "placed_mm": mm(seed.position_m),
+                "planned_ras_mm": to_patient(drop.planned_m), "dropped_at_ras_mm": to_patient(seed.dropped_at_m),
+                "placed_ras_mm": to_patient(seed.position_m), "error_mm": off.distance_m() * 1e3,
+                "error_along_mm": off.along_m * 1e3, "error_across_mm": off.across_m * 1e3,
                 "touches_seeds": touching(&poses, number),
                 "rehearsed_mm": drop.rehearsed_m.map(mm),
                 "off_rehearsal_mm": drop.rehearsed_m.map(|m| distance_m(m, seed.position_m) * 1e3),

@@ -2,7 +2,8 @@
 
 use super::{Environment, GapSection, HostSection, LoopCounts, LoopSection, Margin, Report, StiffnessSection, Verdict};
 use crate::bound;
-use crate::paired::{BOTH, LOOP_ALONE, PairedSection};
+use crate::paired::{BOTH, LOOP_ALONE};
+use crate::paired_section::PairedSection;
 use crate::provenance;
 use crate::raw::Raw;
 use crate::sample::{PARTS, histogram};
