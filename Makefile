@@ -11,7 +11,7 @@ COMPRESSED = --features stylet-files/compressed
 PACKAGED = $(COMPRESSED) --features host-ui/screen-reader
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release package package-test picture example report seeds-oracle causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -97,6 +97,13 @@ loom: ## Try every order in which the force process and its bridge can meet on a
 
 relay: ## Build the relay, which carries a core to other machines; the other targets neither need nor build it
 	$(RELAY) build --profile quick --bin relay
+
+population: products ## Insert the 10,016 needles of docs/study/population.toml, and make the page of where seeds rest (an hour)
+	$(BIN)/rt-core study docs/study/population.toml --out $(BIN)/population
+	$(BIN)/host-ui study $(BIN)/population
+
+validation: ## Compute what docs/validation.md compares with patients, and the error of one seed, and write that page (ten minutes)
+	UPDATE_DOCS=1 $(CARGO) test --profile quick -p stylet-study --lib validation_is_written -- --ignored --nocapture
 
 relay-test: deps-test build ## Test the relay with whole processes (about three minutes)
 	$(RELAY) test --profile quick -- --test-threads=1

@@ -53,12 +53,9 @@ impl Distribution {
     }
 }
 
-/// Name of the distribution of the room between neighbours.
-pub const GAP: &str = "Gap between neighbours on a needle";
-
 /// Returns the room between the ends of neighbours of one needle at rest, mm.
-fn gaps_mm(table: &Table) -> Vec<f64> {
-    let pairs = table.rows.iter().flat_map(|row| row.seeds.windows(2));
+pub fn gaps_mm<'a>(rows: impl IntoIterator<Item = &'a Insertion>) -> Vec<f64> {
+    let pairs = rows.into_iter().flat_map(|row| row.seeds.windows(2));
     let gap_mm = |pair: &[Seed]| {
         let [one, next] = [pair[0].rest?, pair[1].rest?].map(|rest| Vector3::from(rest.at_mm));
         Some((one - next).norm() - 1e3 * SEED_LENGTH_M)
@@ -90,7 +87,7 @@ pub fn figures(table: &Table, scored: &Scored) -> Vec<Distribution> {
     let all = [
         Distribution::new("Seed misplacement", "mm", "seed", seeds(0)),
         Distribution::new("Along the needle, + too deep", "mm", "seed", seeds(1)),
-        Distribution::new(GAP, "mm", "pair", gaps_mm(table)),
+        Distribution::new("Gap between neighbours on a needle", "mm", "pair", gaps_mm(&table.rows)),
         Distribution::new("Shift of the gland", "mm", "insertion", motions(|m| m.target_shift_mm)),
         Distribution::new(largest, "mm", "insertion", motions(|m| m.largest_displacement_mm)),
         Distribution::new("Peak force on the hand", "N", "insertion", motions(|m| m.peak_force_n)),

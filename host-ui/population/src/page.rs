@@ -2,13 +2,14 @@
 
 use crate::dose::{Covered, ImplantDose, Scored};
 use crate::error::PopulationError;
-use crate::figures::{Distribution, GAP, influences, touching};
+use crate::figures::{Distribution, gaps_mm, influences, touching};
 use crate::picture;
 use crate::published::{PUBLISHED, Published, published_in};
 use crate::shards::Population;
 use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
 use stylet_base::format::printable;
+use stylet_insertions::Insertion;
 use stylet_report::parts::{self, Column, cell, num};
 
 const OWN: &str = "\
@@ -44,7 +45,7 @@ pub fn page(p: &Population, scored: &Scored, figures: &[Distribution]) -> Result
             span { i class="line" style="border-top:2px dashed #d55e00" {} "published, numbered as in the caption" }
         }
         div class="plots" { @for plot in &plots { (plot) } }
-        @if let Some(gaps) = figures.iter().find(|d| d.name == GAP) { (neighbours(&gaps.values)) }
+        (neighbours(&p.table.rows))
         (dose(scored))
         (what_goes_with_it(p))
         (published_table())
@@ -142,14 +143,37 @@ fn plot(d: &Distribution) -> Result<Markup, PopulationError> {
     })
 }
 
-fn neighbours(gaps_mm: &[f64]) -> Markup {
-    let (touch, of) = (touching(gaps_mm), gaps_mm.len());
+fn neighbours(rows: &[Insertion]) -> Markup {
+    let mut of_plan: BTreeMap<&String, Vec<&Insertion>> = BTreeMap::new();
+    for row in rows {
+        of_plan.entry(&row.plan).or_default().push(row);
+    }
+    let row = |(plan, rows): (&String, Vec<&Insertion>)| {
+        let gaps_mm = gaps_mm(rows);
+        let nearest_mm = gaps_mm.iter().copied().reduce(f64::min)?;
+        let (touch, of) = (touching(&gaps_mm), gaps_mm.len());
+        Some(vec![
+            cell(printable(plan)),
+            cell(thousands(of)),
+            cell(thousands(touch)),
+            cell(value(Some(100.0 * touch as f64 / of as f64))),
+            cell(format!("{nearest_mm:.3}").replace('-', "\u{2212}")),
+        ])
+    };
+    let rows: Vec<_> = of_plan.into_iter().filter_map(row).collect();
+    if rows.is_empty() {
+        return html! {};
+    }
+    let head = [
+        "plan",
+        "pairs of neighbours on a needle",
+        "touch",
+        "%",
+        "nearest from end to end, mm",
+    ];
     html! {
-        p {
-            "Of " (thousands(of)) " pairs of neighbours on a needle " (thousands(touch)) " touch, "
-            b { (value(Some(100.0 * touch as f64 / of as f64))) " %" }
-            ". The nearest two are " (format!("{:.3}", gaps_mm[0])) " mm from end to end."
-        }
+        h2 { "Seeds that touch" }
+        (parts::numbers(&head, &rows))
     }
 }
 

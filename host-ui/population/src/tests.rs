@@ -95,17 +95,12 @@ fn neighbours_without_a_gap_touch() {
     let mut rows = vec![row(1, 1, 0.0), row(1, 2, 0.0)];
     let first_mm = rows[1].seeds[0].rest.unwrap().at_mm;
     rows[1].seeds[1].rest.as_mut().unwrap().at_mm = [first_mm[0], first_mm[1], first_mm[2] + 4.55];
-    let gaps = figures(&table(rows), &Scored::default());
-    let gaps = &gaps
-        .iter()
-        .find(|d| d.name == figures::GAP)
-        .expect("there are pairs")
-        .values;
+    let gaps = figures::gaps_mm(&rows);
     assert!(
-        (gaps[0] - 0.05).abs() < 1e-9 && (gaps[1] - 5.5).abs() < 1e-9,
+        (gaps[0] - 5.5).abs() < 1e-9 && (gaps[1] - 0.05).abs() < 1e-9,
         "{gaps:?}"
     );
-    assert_eq!(figures::touching(gaps), 1);
+    assert_eq!(figures::touching(&gaps), 1);
 }
 
 #[test]

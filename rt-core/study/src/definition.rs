@@ -20,6 +20,8 @@ struct StudyFile {
     seed: Option<u64>,
     implants: u32,
     tissue: Option<String>,
+    #[serde(default)]
+    linear: bool,
     #[serde(default, rename = "gland")]
     glands: Vec<GlandFile>,
     #[serde(default)]
@@ -45,6 +47,8 @@ pub struct Study {
     pub implants: u32,
     /// Tissue model.
     pub tissue: TissueKind,
+    /// Tissue near the tip stays linear, which changes neither seeds nor forces.
+    pub is_linear: bool,
     /// Glands to implant.
     pub glands: Vec<Gland>,
     /// Quantities in the order of `QUANTITIES`.
@@ -114,6 +118,7 @@ impl Study {
             seed: file.seed.unwrap_or(1),
             implants: file.implants,
             tissue,
+            is_linear: file.linear,
             glands,
             quantities,
             parameters,

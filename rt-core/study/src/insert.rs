@@ -35,11 +35,14 @@ impl Body {
             self.0 = None;
             let source = SceneSource::Builtin(scene.to_owned()).stiffened(stiffness)?;
             let stage = Stage::build(&source, study.tissue, DeviceInfo::phantom_premium_1_5());
-            let stage = stage.map_err(|why| StudyError::Body {
+            let mut stage = stage.map_err(|why| StudyError::Body {
                 scene: scene.to_owned(),
                 stiffness,
                 why,
             })?;
+            if study.is_linear {
+                stage.seeds_and_forces_alone();
+            }
             return Ok(&mut self.0.insert((key, stage)).1);
         }
         match &mut self.0 {

@@ -2,7 +2,9 @@
 //! whole.
 
 mod file;
+mod population;
 mod shards;
+mod validation;
 
 use crate::Study;
 use std::path::Path;

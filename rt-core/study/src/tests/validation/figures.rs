@@ -1,0 +1,214 @@
+//! Figures of Stylet that have a published counterpart, at the defaults of every parameter.
+
+use super::budget::{paper, stage};
+use super::study;
+use crate::quantity::Id;
+use crate::spread::Spread;
+use crate::tests::shards::finished_in;
+use std::fmt::Write as _;
+use stylet_insertions::{Insertion, Seed};
+use stylet_runtime::rehearse::Stage;
+use stylet_shm_schema::{ParameterId, ParameterSet};
+use stylet_sim::scene::{Scene, TissueKind};
+
+/// Share of the needle's force that the hand feels.
+const FORCE_SCALE: f64 = 0.9;
+
+/// A figure by the name that the published one has.
+pub struct Own {
+    pub what: &'static str,
+    pub value: f64,
+    pub how: String,
+}
+
+/// Returns the beginning of the section: where the figures come from.
+pub fn about() -> String {
+    let study = study("validation.toml");
+    let needles: usize = study.glands.iter().map(|gland| gland.plan.needles.len()).sum();
+    format!(
+        "\
+## Against patients
+
+Stylet's figures are of [`validation.toml`](study/validation.toml): {} insertions of strands into `pelvis`, each into
+tissue at rest, every parameter at its default. The entry is off by 1 mm and 0.5 degrees (standard deviation of each
+direction across), the stiffness by a factor of 1.6 (68 %). Deflection is of `paper`, with bending turned on.
+
+",
+        study.implants as usize * needles
+    )
+}
+
+/// Returns the section that shows by which number the figures change most.
+pub fn by_friction_and_stiffness() -> String {
+    let mut text = "\
+## By friction and stiffness
+
+The first two implants of the same study, with one friction of the shaft in the gland and one factor on the stiffness of all
+tissue. Misplacement is the mean over needles of their means: a needle with one seed counts as much as one with five. Published are
+4.9 mm of misplacement over seeds (fitted, before the tip cut by toughness) and a shift of 5.6 mm.
+
+| friction, N/m | stiffness | misplacement, mm | shift of the gland, mean and largest, mm | largest displacement, mm | peak force at the needle, N |
+|---|---|---|---|---|---|
+"
+    .to_owned();
+    for (friction_n_per_m, stiffness) in [(30.0, 1.0), (80.0, 1.0), (80.0, 0.5), (160.0, 1.0), (210.0, 1.0)] {
+        let mut study = study("validation.toml");
+        study.implants = 2;
+        study.quantities[Id::Stiffness as usize] = Spread::Fixed(stiffness);
+        study
+            .parameters
+            .push((ParameterId::ShaftFriction.spec(), Spread::Fixed(friction_n_per_m)));
+        let table = finished_in(&study);
+        let motions: Vec<_> = table.rows.iter().filter_map(|row| row.outcome.as_ref().ok()).collect();
+        let shifts_mm = motions.iter().map(|m| m.target_shift_mm);
+        let _ = writeln!(
+            text,
+            "| {friction_n_per_m} | {stiffness} | {:.1} | {:.1}, {:.1} | {:.1} | {:.1} |",
+            mean(table.rows.iter().filter_map(misplacement_mm)),
+            mean(shifts_mm.clone()),
+            shifts_mm.fold(0.0, f64::max),
+            mean(motions.iter().map(|m| m.largest_displacement_mm)),
+            mean(motions.iter().map(|m| m.peak_force_n)) / FORCE_SCALE,
+        );
+    }
+    text.push('\n');
+    text
+}
+
+struct Placed {
+    planned_mm: [f64; 3],
+    off_mm: [f64; 3],
+}
+
+impl Placed {
+    fn of(seed: &Seed) -> Option<Self> {
+        let rest = seed.rest?;
+        Some(Self {
+            planned_mm: seed.planned_mm,
+            off_mm: [0, 1, 2].map(|a| rest.at_mm[a] - seed.planned_mm[a]),
+        })
+    }
+
+    fn total_mm(&self) -> f64 {
+        self.off_mm.iter().map(|c| c * c).sum::<f64>().sqrt()
+    }
+}
+
+fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, count) = values
+        .into_iter()
+        .fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
+    sum / count
+}
+
+/// Returns the mean total misplacement of one group of seeds over that of another one.
+fn ratio(seeds: &[Placed], of: impl Fn(&Placed) -> bool, over: impl Fn(&Placed) -> bool) -> f64 {
+    let of = mean(seeds.iter().filter(|seed| of(seed)).map(Placed::total_mm));
+    of / mean(seeds.iter().filter(|seed| over(seed)).map(Placed::total_mm))
+}
+
+fn misplacement_mm(row: &Insertion) -> Option<f64> {
+    let seeds: Vec<f64> = row
+        .seeds
+        .iter()
+        .filter_map(Placed::of)
+        .map(|seed| seed.total_mm())
+        .collect();
+    (!seeds.is_empty()).then(|| mean(seeds))
+}
+
+pub fn of_stylet() -> Vec<Own> {
+    let table = finished_in(&study("validation.toml"));
+    let (low, high) = Scene::builtin("pelvis").expect("built in").target_bounds_m();
+    let share = |seed: &Placed, axis: usize| (1e-3 * seed.planned_mm[axis] - low[axis]) / (high[axis] - low[axis]);
+    let seeds: Vec<Placed> = table
+        .rows
+        .iter()
+        .flat_map(|row| &row.seeds)
+        .filter_map(Placed::of)
+        .collect();
+    let motions: Vec<_> = table.rows.iter().filter_map(|row| row.outcome.as_ref().ok()).collect();
+    let failed = table.rows.len() - motions.len();
+    let along = |axis: usize| mean(seeds.iter().map(|seed| seed.off_mm[axis].abs()));
+    let speed = table
+        .quantities
+        .iter()
+        .position(|name| name.starts_with("insert_mm"))
+        .expect("is drawn");
+    let mut needles: Vec<(f64, f64)> = table
+        .rows
+        .iter()
+        .filter_map(|row| Some((row.drawn[speed], misplacement_mm(row)?)))
+        .collect();
+    needles.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (slow, fast) = needles.split_at(needles.len() / 2);
+    let of_half = |half: &[(f64, f64)]| mean(half.iter().map(|needle| needle.1));
+    let largest = |of: fn(&stylet_insertions::Motion) -> f64| motions.iter().map(|m| of(m)).fold(0.0, f64::max);
+    let shift_mm = mean(motions.iter().map(|m| m.target_shift_mm));
+    let many = format!("mean of {} seeds", seeds.len());
+    let own = |what, value, how: &str| Own {
+        what,
+        value,
+        how: how.to_owned(),
+    };
+    vec![
+        own(
+            "seed misplacement",
+            mean(seeds.iter().map(Placed::total_mm)),
+            &format!("{many}; {failed} of {} needles failed", table.rows.len()),
+        ),
+        own("seed misplacement, to the side", along(0), &many),
+        own("seed misplacement, up or down", along(1), &many),
+        own("seed misplacement, along the needle", along(2), &many),
+        own(
+            "misplacement at the base over midgland",
+            ratio(
+                &seeds,
+                |s| share(s, 2) > 2.0 / 3.0,
+                |s| (1.0 / 3.0..2.0 / 3.0).contains(&share(s, 2)),
+            ),
+            "thirds of the gland",
+        ),
+        own(
+            "misplacement in front over behind",
+            ratio(&seeds, |s| share(s, 1) > 0.5, |s| share(s, 1) < 0.5),
+            "halves of the gland",
+        ),
+        own(
+            "misplacement of fast needles over slow ones",
+            of_half(fast) / of_half(slow),
+            "halves of the needles by speed, 20 to 120 mm/s",
+        ),
+        own(
+            "shift, needle pushed by hand",
+            shift_mm,
+            &format!("largest {:.1} mm", largest(|m| m.target_shift_mm)),
+        ),
+        own(
+            "shift of the base",
+            shift_mm,
+            "of the whole gland, one needle in; at most four may stay in",
+        ),
+        own(
+            "displacement of the target, biopsy",
+            mean(motions.iter().map(|m| m.largest_displacement_mm)),
+            "of the tissue at the tip",
+        ),
+        own(
+            "force of an 18 G needle",
+            mean(motions.iter().map(|m| m.peak_force_n)) / FORCE_SCALE,
+            "at the needle, mean of the peaks",
+        ),
+        own(
+            "deflection of the tip, transrectal",
+            deflection_mm(&mut stage(&paper(), TissueKind::ChainMail)),
+            "18 G, one needle on the axis of `paper`, bevel 0.7; off by default",
+        ),
+    ]
+}
+
+fn deflection_mm(stage: &mut Stage) -> f64 {
+    let mut set = ParameterSet::default();
+    set.set(ParameterId::BendingStiffness, 0.016);
+    1e3 * super::budget::default_procedure(stage, &set).deflection_m
+}
