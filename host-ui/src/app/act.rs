@@ -84,7 +84,7 @@ impl App {
             Some(Question::Remove(_, action)) => {
                 let folder = folder_of("before-reset");
                 self.save_seeds(folder.clone());
-                self.execute(action, ctx);
+                self.execute(*action, ctx);
                 // Not before: no run begins while the planner writes.
                 self.save_plan(&folder);
             }

@@ -24,7 +24,7 @@ pub enum Question {
     /// A run while a fault stands.
     Rearm(Begin),
     /// An action that removes what is in the tissue, with its name.
-    Remove(&'static str, Action),
+    Remove(&'static str, Box<Action>),
 }
 
 impl Question {
@@ -39,7 +39,7 @@ impl Question {
             _ => return None,
         };
         let is_lost = in_tissue(shown).is_some() || name == LOAD && shown.is_in_tissue();
-        is_lost.then(|| Self::Remove(name, action.clone()))
+        is_lost.then(|| Self::Remove(name, Box::new(action.clone())))
     }
 }
 

@@ -54,7 +54,7 @@ fn what_removes_seeds_says_so_and_waits_for_the_answer() {
             "{action:?}"
         );
         assert!(
-            matches!(&drawn.app.question, Some(Question::Remove(_, asked)) if *asked == action),
+            matches!(&drawn.app.question, Some(Question::Remove(_, asked)) if **asked == action),
             "{action:?}"
         );
         drawn.place("Keep the implant (N)");

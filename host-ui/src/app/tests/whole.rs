@@ -144,7 +144,7 @@ pub const STATES: &[State] = &[
     }),
     ("question before a reset", |app| {
         app.shown = one_needle(0.0, 5);
-        app.question = Some(Question::Remove("Reset", Action::Send(Request::Reset)));
+        app.question = Some(Question::Remove("Reset", Box::new(Action::Send(Request::Reset))));
     }),
     ("planned", |app| app.shown = one_needle(0.0, 0)),
     ("inserting", |app| app.shown = one_needle(0.03, 0)),

@@ -101,7 +101,6 @@ fn validation_is_written() {
         );
     }
     page.push('\n');
-    page.push_str(&figures::by_friction_and_stiffness());
     page.push_str(&budget::section());
     print!("{page}");
     if std::env::var_os("UPDATE_DOCS").is_some() {

@@ -2,10 +2,7 @@
 
 use super::budget::{paper, stage};
 use super::study;
-use crate::quantity::Id;
-use crate::spread::Spread;
 use crate::tests::shards::finished_in;
-use std::fmt::Write as _;
 use stylet_insertions::{Insertion, Seed};
 use stylet_runtime::rehearse::Stage;
 use stylet_shm_schema::{ParameterId, ParameterSet};
@@ -36,43 +33,6 @@ direction across), the stiffness by a factor of 1.6 (68 %). Deflection is of `pa
 ",
         study.implants as usize * needles
     )
-}
-
-/// Returns the section that shows by which number the figures change most.
-pub fn by_friction_and_stiffness() -> String {
-    let mut text = "\
-## By friction and stiffness
-
-The first two implants of the same study, with one friction of the shaft in the gland and one factor on the stiffness of all
-tissue. Misplacement is the mean over needles of their means: a needle with one seed counts as much as one with five. Published are
-4.9 mm of misplacement over seeds (fitted, before the tip cut by toughness) and a shift of 5.6 mm.
-
-| friction, N/m | stiffness | misplacement, mm | shift of the gland, mean and largest, mm | largest displacement, mm | peak force at the needle, N |
-|---|---|---|---|---|---|
-"
-    .to_owned();
-    for (friction_n_per_m, stiffness) in [(30.0, 1.0), (80.0, 1.0), (80.0, 0.5), (160.0, 1.0), (210.0, 1.0)] {
-        let mut study = study("validation.toml");
-        study.implants = 2;
-        study.quantities[Id::Stiffness as usize] = Spread::Fixed(stiffness);
-        study
-            .parameters
-            .push((ParameterId::ShaftFriction.spec(), Spread::Fixed(friction_n_per_m)));
-        let table = finished_in(&study);
-        let motions: Vec<_> = table.rows.iter().filter_map(|row| row.outcome.as_ref().ok()).collect();
-        let shifts_mm = motions.iter().map(|m| m.target_shift_mm);
-        let _ = writeln!(
-            text,
-            "| {friction_n_per_m} | {stiffness} | {:.1} | {:.1}, {:.1} | {:.1} | {:.1} |",
-            mean(table.rows.iter().filter_map(misplacement_mm)),
-            mean(shifts_mm.clone()),
-            shifts_mm.fold(0.0, f64::max),
-            mean(motions.iter().map(|m| m.largest_displacement_mm)),
-            mean(motions.iter().map(|m| m.peak_force_n)) / FORCE_SCALE,
-        );
-    }
-    text.push('\n');
-    text
 }
 
 struct Placed {
