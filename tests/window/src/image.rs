@@ -184,6 +184,8 @@ fn an_image_lies_where_its_file_says_and_moves_with_the_tissue() {
     assert!(all.now() > 0.95, "and back: {all:?}");
     // Another scene is another patient.
     driven.click("pelvis");
+    // The needle is in the tissue.
+    driven.press(egui::Key::Y);
     driven.until("pelvis", |app| {
         app.link()
             .scene()
