@@ -202,10 +202,12 @@ fn a_thread_of_higher_priority_is_named_without_a_trace() {
     assert!(10 * named >= 9 * disturbed.len(), "{disturbed:?}");
 }
 
-/// Measures for five seconds without a trace while `beside` runs; returns what else ran.
-fn others(name: &str, beside: &mut [Command]) -> Value {
+/// Measures for five seconds without a trace while `beside` runs; returns what else ran, and the process number of
+/// `beside`.
+fn others(name: &str, beside: Option<Command>) -> (Value, u32) {
     let out = folder(name);
-    let mut running: Vec<Child> = beside.iter_mut().map(|c| c.spawn().expect("it starts")).collect();
+    let mut running = beside.map(|mut c| c.spawn().expect("it starts"));
+    let id = running.as_ref().map_or(0, Child::id);
     let mut child = Command::new(program("rt-core"))
         .args(["latency", "--duration", "5s", "--out"])
         .arg(&out)
@@ -214,13 +216,13 @@ fn others(name: &str, beside: &mut [Command]) -> Value {
         .spawn()
         .expect("rt-core starts");
     child.wait().expect("ours");
-    for other in &mut running {
+    if let Some(other) = &mut running {
         other.kill().expect("ours");
         other.wait().expect("ours");
     }
     let text = std::fs::read_to_string(out.join("report.json")).expect("rt-core wrote its report");
     let report: Value = serde_json::from_str(&text).expect("the report is JSON");
-    report["others"].clone()
+    (report["others"].clone(), id)
 }
 
 /// `make causes`.
@@ -231,25 +233,25 @@ fn a_second_core_and_a_busy_pc_are_named_without_a_trace() {
         let found = all["threads"].as_array().expect("a list");
         found.iter().any(|t| t["name"] == name)
     };
-    let is_core = |i: &Value| i.as_str().is_some_and(|i| i.starts_with("rt-core ("));
-    let has_core = |all: &Value| all["instances"].as_array().expect("a list").iter().any(is_core);
-    let quiet = others("alone", &mut []);
-    assert!(!lists(&quiet, "inj-busy") && !has_core(&quiet), "{quiet}");
-    let name = format!("causes-{}", std::process::id());
+    let (quiet, _) = others("alone", None);
+    assert!(!lists(&quiet, "inj-busy"), "{quiet}");
     let mut second = Command::new(program("rt-core"));
+    let name = format!("causes-{}", std::process::id());
     second
         .args(["--instance", &name])
         .stdout(Stdio::null())
         .stderr(Stdio::null());
-    let second_core = others("second-core", &mut [second]);
-    assert!(has_core(&second_core), "{second_core}");
+    let (second_core, id) = others("second-core", Some(second));
+    let instances = second_core["instances"].as_array().expect("a list");
+    assert!(
+        instances.iter().any(|i| *i == format!("rt-core ({id})")),
+        "{second_core}"
+    );
     let mut busy = Command::new("sh");
     busy.args(["-c", "printf inj-busy > /proc/$$/comm; while :; do :; done"]);
-    let busy_pc = others("busy", &mut [busy]);
-    assert!(
-        lists(&busy_pc, "inj-busy") && busy_pc["cores_taken"].as_f64() > Some(0.1),
-        "{busy_pc}"
-    );
+    let (busy_pc, _) = others("busy", Some(busy));
+    let taken = busy_pc["cores_taken"].as_f64();
+    assert!(lists(&busy_pc, "inj-busy") && taken > Some(0.1), "{busy_pc}");
 }
 
 /// SIGKILL in the middle: the keeper removes the instance.
