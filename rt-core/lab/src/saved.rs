@@ -1,15 +1,11 @@
 //! A saved report, as far as others read it. Reports of schema 1 are read too, and marked.
 
-use crate::disk;
 use crate::provenance::Fact;
-use crate::report::JSON;
 use crate::sealed;
 use crate::sign;
 use crate::verdict::Outcome;
-use crate::verify;
 use crate::whose::Whose;
 use serde::Deserialize;
-use std::path::Path;
 
 /// A report; an older one lacks the fields with a default.
 #[derive(Clone, Debug, Deserialize)]
@@ -107,29 +103,10 @@ impl Saved {
     pub fn doubts(&self) -> impl Iterator<Item = &String> {
         self.notes
             .iter()
-            .filter(|n| n.ends_with(sealed::MISSING) || *n == verify::OLDER)
+            .filter(|n| n.ends_with(sealed::MISSING) || *n == sealed::OLDER)
     }
 
     pub fn is_unsigned(&self) -> bool {
         self.notes.iter().any(|n| n == sign::UNSIGNED)
     }
-}
-
-/// Reads the report `file`; an altered one is refused, as is one that contradicts itself or has a wrong signature. Page
-/// and raw data may be missing: reports are often collected without them; the notes say so.
-pub fn read(file: &Path, allowed: Option<&Path>) -> Result<Saved, NotCounted> {
-    let refused = |why: String| NotCounted {
-        path: file.display().to_string(),
-        why,
-    };
-    let text = disk::read_text(file).map_err(|e| refused(e.to_string()))?;
-    let checked = verify::check(file, &text, allowed);
-    if let Some(problem) = checked.problems.into_iter().next() {
-        return Err(refused(problem));
-    }
-    let report = serde_json::from_str(&text).map_err(|e| refused(format!("not the {JSON} of a measurement: {e}")))?;
-    Ok(Saved {
-        notes: checked.notes,
-        ..report
-    })
 }

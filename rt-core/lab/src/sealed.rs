@@ -7,6 +7,8 @@ use serde_json::Value;
 pub const NO_DIGEST: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 /// What a problem with a file that is not there ends with.
 pub const MISSING: &str = ": missing";
+/// Note of a report whose figures nothing supports.
+pub const OLDER: &str = "of an older version: its figures cannot be computed again";
 
 /// Fills in the digest of a text that has [`NO_DIGEST`] in its place.
 pub fn seal(text: &str) -> String {

@@ -7,7 +7,8 @@ use crate::campaign;
 use crate::disk::{self, DiskError};
 use crate::provenance::sha256;
 use crate::report::{JSON, OLD_SCHEMA, SCHEMA};
-use crate::sealed::{self, MISSING};
+use crate::saved::{NotCounted, Saved};
+use crate::sealed::{self, MISSING, OLDER};
 use crate::sign;
 use crate::spread::{self, SPREAD};
 use clap::Args;
@@ -116,8 +117,24 @@ pub(crate) struct Checked {
     pub notes: Vec<String>,
 }
 
-/// Note of a report whose figures nothing supports.
-pub(crate) const OLDER: &str = "of an older version: its figures cannot be computed again";
+/// Reads the report `file`; an altered one is refused, as is one that contradicts itself or has a wrong signature. Page
+/// and raw data may be missing: reports are often collected without them; the notes say so.
+pub(crate) fn read(file: &Path, allowed: Option<&Path>) -> Result<Saved, NotCounted> {
+    let refused = |why: String| NotCounted {
+        path: file.display().to_string(),
+        why,
+    };
+    let text = disk::read_text(file).map_err(|e| refused(e.to_string()))?;
+    let checked = check(file, &text, allowed);
+    if let Some(problem) = checked.problems.into_iter().next() {
+        return Err(refused(problem));
+    }
+    let report = serde_json::from_str(&text).map_err(|e| refused(format!("not the {JSON} of a measurement: {e}")))?;
+    Ok(Saved {
+        notes: checked.notes,
+        ..report
+    })
+}
 
 /// Checks digests, figures and signature of the report `file` with the contents `text`.
 pub(crate) fn check(file: &Path, text: &str, allowed: Option<&Path>) -> Checked {

@@ -1,7 +1,8 @@
 //! Reports of `rt-core latency` as evidence: digest and outcome of each limit.
 
 use crate::report::JSON;
-use crate::saved::{self, NotCounted};
+use crate::saved::NotCounted;
+use crate::verify;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -23,7 +24,7 @@ pub struct Run {
 /// Reads `report.json` in `folder`. An altered one is refused.
 pub fn read(folder: &Path) -> Result<Run, NotCounted> {
     let file = folder.join(JSON);
-    let report = saved::read(&file, None)?;
+    let report = verify::read(&file, None)?;
     let p = &report.protocol;
     let limits = report.verdict.limits.into_iter();
     Ok(Run {

@@ -1,7 +1,8 @@
 //! One report of the fleet.
 
-use crate::saved::{self, NotCounted, Saved, Times};
+use crate::saved::{NotCounted, Saved, Times};
 use crate::verdict::Outcome;
+use crate::verify;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -30,7 +31,7 @@ const OWN: [&str; 3] = ["memory lock", "PC: name", "PC: serial number"];
 
 /// Reads a report; `allowed` are the people who may sign.
 pub fn read(file: &Path, allowed: Option<&Path>) -> Result<Entry, NotCounted> {
-    let report = saved::read(file, allowed)?;
+    let report = verify::read(file, allowed)?;
     let named = report.facts.iter().find(|f| f.group == "PC" && f.name == "name");
     let named = named.map(|f| f.value.clone()).filter(|name| name != "not reported");
     let above = file
