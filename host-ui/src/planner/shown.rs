@@ -55,8 +55,8 @@ impl Planning {
         Some((number, self.implant.as_ref()?.plan.needles.get(number)?))
     }
 
-    /// Returns the depths at which it leaves the middles of its seeds, deepest first, m; empty if no needle of a plan is
-    /// inserted.
+    /// Returns the depths at which it leaves the middles of its seeds, deepest first, m; empty if no needle of a plan
+    /// is inserted.
     pub fn drops_m(&self) -> &[f64] {
         let drops = self.at_work().and_then(|(n, _)| self.implant.as_ref()?.drops_m.get(n));
         drops.map_or(&[], |d| d)

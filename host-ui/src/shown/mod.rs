@@ -278,7 +278,8 @@ impl Shown {
         Some(self.path_length_m()? - PAST_LAST_SEED_M)
     }
 
-    /// Returns the depth of the tip when the deepest planned seed without a dropped one leaves it; `None` if there is none.
+    /// Returns the depth of the tip when the deepest planned seed without a dropped one leaves it; `None` if there is
+    /// none.
     pub fn next_seed_m(&self) -> Option<f64> {
         let plan = self.plan.as_ref()?;
         let rows = own_errors(self);

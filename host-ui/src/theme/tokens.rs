@@ -177,18 +177,12 @@ pub const IMAGE: ImageTokens = ImageTokens {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stylet_test_kit::sight;
 
     /// Returns red, green and blue of sRGB in proportion to light.
     fn linear(color: Color32) -> [f64; 3] {
-        let [r, g, b, _] = color.to_array().map(|byte| {
-            let v = f64::from(byte) / 255.0;
-            if v <= 0.04045 {
-                v / 12.92
-            } else {
-                ((v + 0.055) / 1.055).powf(2.4)
-            }
-        });
-        [r, g, b]
+        let [r, g, b, _] = color.to_array();
+        sight::linear([r, g, b])
     }
 
     /// Returns the relative luminance (WCAG 2.2).
@@ -258,54 +252,6 @@ mod tests {
         }
     }
 
-    type Matrix = [[f64; 3]; 3];
-
-    /// Normal sight, deuteranopia and protanopia in linear sRGB (Machado, Oliveira and Fernandes
-    /// 2009, table 1 at severity 1).
-    const SIGHTS: [(&str, Matrix); 3] = [
-        ("normal", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
-        (
-            "deuteranopia",
-            [
-                [0.367_322, 0.860_646, -0.227_968],
-                [0.280_085, 0.672_501, 0.047_413],
-                [-0.011_820, 0.042_940, 0.968_881],
-            ],
-        ),
-        (
-            "protanopia",
-            [
-                [0.152_286, 1.052_583, -0.204_868],
-                [0.114_503, 0.786_281, 0.099_216],
-                [-0.003_882, -0.048_116, 1.051_998],
-            ],
-        ),
-    ];
-
-    fn times(matrix: &Matrix, v: [f64; 3]) -> [f64; 3] {
-        matrix.map(|row| row.iter().zip(v).map(|(a, b)| a * b).sum())
-    }
-
-    /// Returns L*, a*, b* (CIE 1976, D65) as this sight sees the colour.
-    fn lab(color: Color32, sight: &Matrix) -> [f64; 3] {
-        let seen = times(sight, linear(color)).map(|c| c.clamp(0.0, 1.0));
-        let to_xyz = [
-            [0.4124, 0.3576, 0.1805],
-            [0.2126, 0.7152, 0.0722],
-            [0.0193, 0.1192, 0.9505],
-        ];
-        let [x, y, z] = times(&to_xyz, seen);
-        let f = |t: f64| {
-            if t > 0.008_856 {
-                t.cbrt()
-            } else {
-                7.787 * t + 16.0 / 116.0
-            }
-        };
-        let [x, y, z] = [f(x / 0.950_47), f(y), f(z / 1.088_83)];
-        [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
-    }
-
     /// Guards against urethra, rectum and bladder in one pink.
     #[test]
     fn structures_differ_for_every_sight() {
@@ -316,14 +262,14 @@ mod tests {
             ("light", [l.gland, l.urethra, l.rectum, l.bladder, l.spared, l.bone]),
             ("image", [i.gland, i.urethra, i.rectum, i.bladder, i.spared, i.bone]),
         ] {
-            for (sight, matrix) in &SIGHTS {
+            for (of, matrix) in &sight::SIGHTS {
                 for (n, one) in colors.iter().enumerate() {
                     for other in &colors[n + 1..] {
-                        let [a, b] = [one, other].map(|color| lab(*color, matrix));
-                        let apart = (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt();
+                        let [a, b] = [one, other].map(|color| sight::seen(linear(*color), matrix));
+                        let apart = sight::apart(a, b);
                         assert!(
                             apart > LEAST,
-                            "{place}, {sight}: {one:?} and {other:?} are {apart:.1} apart"
+                            "{place}, {of}: {one:?} and {other:?} are {apart:.1} apart"
                         );
                     }
                 }

@@ -148,7 +148,7 @@ pub fn impossible(setup: &Setup, against: Against) -> Option<String> {
     }
 }
 
-/// Measures our loops and the other side alternately, `rounds` times each.
+/// Measures our loops and the other side alternately, `rounds` times each, where that is not [`impossible`].
 pub fn compare(
     setup: &Setup,
     against: Against,
@@ -159,14 +159,13 @@ pub fn compare(
         Against::Untraced => (setup.duration_ns / 4 / u64::from(rounds)).max(SHORTEST_TRACED_TURN_NS),
         _ => (setup.duration_ns / u64::from(rounds)).max(SHORTEST_TURN_NS),
     };
-    let tool = match against {
-        Against::Cyclictest => version(),
-        Against::Unloaded | Against::Untraced => Some(String::new()),
-    };
     let mut comparison = Comparison {
         against,
-        absent: impossible(setup, against),
-        tool: tool.unwrap_or_default(),
+        absent: None,
+        tool: match against {
+            Against::Cyclictest => version().unwrap_or_default(),
+            Against::Unloaded | Against::Untraced => String::new(),
+        },
         names: COMPARED.map(|(name, _)| name.to_owned()),
         turn_s: turn_ns as f64 / 1e9,
         rounds: Vec::new(),
@@ -174,9 +173,6 @@ pub fn compare(
         ours: histogram(),
         others: histogram(),
     };
-    if comparison.absent.is_some() {
-        return Ok(comparison);
-    }
     let setup = Setup {
         // Only the cost of the trace is measured with the trace.
         trace_over_ns: setup.trace_over_ns.filter(|_| against == Against::Untraced),

@@ -169,8 +169,8 @@ pub fn limits(period_ns: u64, given: &[String]) -> Result<Limits, LimitsError> {
     Ok(ProblemList::check(problems).map(|()| limits)?)
 }
 
-/// Checks that a run is long enough for the percentiles that the command line asks for; those of the defaults say in the
-/// report how long it must be.
+/// Checks that a run is long enough for the percentiles that the command line asks for; those of the defaults say in
+/// the report how long it must be.
 pub fn check_duration(given: &[String], duration_ns: u64, period_ns: u64) -> Result<(), LimitsError> {
     let has_s = duration_ns as f64 / 1e9;
     let too_short = |word: &String| {

@@ -1,6 +1,7 @@
-//! Common basis of system tests: the built programs, the repository, a folder for each test, kept traces, and a check
-//! for machine stalls.
+//! Common basis of system tests: the built programs, the repository, a folder for each test, kept traces, colour
+//! blindness, and a check for machine stalls.
 
+pub mod sight;
 pub mod trace;
 pub mod witness;
 

@@ -1,6 +1,7 @@
 //! The real window on a separate core, drawn by the software driver and driven like by a person.
 
 use crate::kept::{assert_like_kept, tolerant, with_fewer_greys};
+use egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable, by};
 use host_ui::app::{App, Options};
@@ -82,6 +83,32 @@ impl Driven {
         self.window.run_steps(2);
     }
 
+    /// Types into the last field with this in its label, instead of its text.
+    pub fn type_into(&mut self, label: &str, text: &str) {
+        fn field<'a>(driven: &'a Driven, label: &'a str) -> egui_kittest::Node<'a> {
+            let fields = driven
+                .window
+                .query_all(by().role(Role::TextInput).label_contains(label));
+            fields.last().expect("a field")
+        }
+        field(self, label).focus();
+        self.window.run_steps(2);
+        self.window.key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::A);
+        self.window.run_steps(2);
+        field(self, label).type_text(text);
+        self.window.run_steps(2);
+    }
+
+    /// Waits for a label that contains these words.
+    pub fn wait_for_label(&mut self, words: &str) {
+        let begun = Instant::now();
+        while self.window.query_by_label_contains(words).is_none() {
+            assert!(begun.elapsed() < Duration::from_secs(60), "waited in vain for {words}");
+            self.window.run_steps(1);
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
     pub fn press(&mut self, key: egui::Key) {
         self.window.key_press(key);
         self.window.run_steps(2);
@@ -98,8 +125,8 @@ impl Driven {
         self.rest();
     }
 
-    /// Waits until the tip stands: the goal is reached to 0.1 mm while the hand still moves, and an exercise that loses the
-    /// device would hold it there.
+    /// Waits until the tip stands: the goal is reached to 0.1 mm while the hand still moves, and an exercise that
+    /// loses the device would hold it there.
     fn rest(&mut self) {
         let tip =
             |driven: &Self| nalgebra::Vector3::from(driven.window.state().link().state().expect("live").tip_in_scene_m);

@@ -2,7 +2,7 @@
 //! and their end.
 
 use crate::driven::{Driven, misplaced};
-use egui_kittest::kittest::{NodeT, Queryable, by};
+use egui_kittest::kittest::{NodeT, Queryable};
 use host_ui::app::App;
 use host_ui::view::orientation::Orientation;
 use nalgebra::{Rotation3, Vector3};
@@ -67,30 +67,8 @@ fn load(driven: &mut Driven, path: &Path) {
     if driven.window.query_by_label("Load image…").is_none() {
         driven.click("1  Choose the scene");
     }
-    let field = driven
-        .window
-        .get(by().role(egui::accesskit::Role::TextInput).label_contains("elements"));
-    field.focus();
-    driven.window.run_steps(2);
-    driven
-        .window
-        .key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::A);
-    driven.window.run_steps(2);
-    let field = driven
-        .window
-        .get(by().role(egui::accesskit::Role::TextInput).label_contains("elements"));
-    field.type_text(path.to_str().expect("words"));
-    driven.window.run_steps(2);
+    driven.type_into("elements", path.to_str().expect("words"));
     driven.click("Load image…");
-}
-
-fn wait_for(driven: &mut Driven, words: &str) {
-    let start = std::time::Instant::now();
-    while driven.window.query_by_label_contains(words).is_none() {
-        assert!(start.elapsed().as_secs() < 30, "waited in vain for {words}");
-        driven.window.run_steps(1);
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
 }
 
 /// Agreement of places in a slice, or of those whose tissue has moved.
@@ -158,7 +136,7 @@ fn an_image_lies_where_its_file_says_and_moves_with_the_tissue() {
     let [speckle, _] = agreement(&mut driven, &image);
     assert!(speckle.now() < 0.2, "without the image: {speckle:?}");
     load(&mut driven, &path);
-    wait_for(&mut driven, "is shown in the slices");
+    driven.wait_for_label("is shown in the slices");
     let [all, _] = agreement(&mut driven, &image);
     driven.picture("image-at-rest");
     assert!(all.now() > 0.97, "at rest: {all:?}");
@@ -207,10 +185,10 @@ fn foreign_images_and_other_files_are_refused_with_a_reason() {
     let path = in_scratch("ui-image-elsewhere");
     write_image(&driven, &path, 0.3);
     load(&mut driven, &path);
-    wait_for(&mut driven, "is it of this patient");
+    driven.wait_for_label("is it of this patient");
     std::fs::write(&path, b"no image").expect("written");
     load(&mut driven, &path);
-    wait_for(&mut driven, "its format is not supported");
+    driven.wait_for_label("its format is not supported");
     assert!(driven.window.query_by_label("Image").is_none());
 }
 

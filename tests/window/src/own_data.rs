@@ -1,8 +1,7 @@
 //! A segmentation without names, from the file to three proposals of a plan, by labels of the window alone.
 
 use crate::driven::Driven;
-use egui::accesskit::Role;
-use egui_kittest::kittest::{Queryable, by};
+use egui_kittest::kittest::Queryable;
 use std::path::Path;
 use stylet_shm_schema::role;
 use stylet_tests::scratch;
@@ -31,37 +30,6 @@ fn write_labels(path: &Path) {
     std::fs::write(path, [head.into_bytes(), labels].concat()).expect("written");
 }
 
-/// Types into the field beside this label, in place of what is there.
-fn type_into(driven: &mut Driven, label: &str, text: &str) {
-    let wanted = label.to_owned();
-    let field = move |driven: &Driven, wanted: &str| {
-        let fields = driven
-            .window
-            .query_all(by().role(Role::TextInput).label_contains(wanted));
-        fields.last().map(|field| field.focus()).expect("a field");
-    };
-    field(driven, &wanted);
-    driven.window.run_steps(2);
-    driven
-        .window
-        .key_press_modifiers(egui::Modifiers::COMMAND, egui::Key::A);
-    driven.window.run_steps(2);
-    let fields = driven
-        .window
-        .query_all(by().role(Role::TextInput).label_contains(&wanted));
-    fields.last().map(|field| field.type_text(text)).expect("a field");
-    driven.window.run_steps(2);
-}
-
-fn wait_for(driven: &mut Driven, label: &str) {
-    let begun = std::time::Instant::now();
-    while driven.window.query_by_label_contains(label).is_none() {
-        assert!(begun.elapsed().as_secs() < 60, "waited in vain for {label}");
-        driven.window.run_steps(1);
-        std::thread::sleep(std::time::Duration::from_millis(10));
-    }
-}
-
 fn names(driven: &Driven) -> Vec<(String, u32)> {
     let scene = driven.window.state().link().scene().expect("live");
     let structures = scene.header.structures().iter();
@@ -75,16 +43,16 @@ fn labels_without_names_become_a_scene_that_can_be_planned() {
     let (path, scene_file) = (folder.join("gland.nrrd"), folder.join("gland.toml"));
     write_labels(&path);
     driven.click("1  Choose the scene");
-    type_into(&mut driven, "elements", path.to_str().expect("words"));
+    driven.type_into("elements", path.to_str().expect("words"));
     driven.click("Load scene…");
-    wait_for(&mut driven, "Choose the target");
+    driven.wait_for_label("Choose the target");
     driven.picture("own-data-labels");
     for (label, name) in [("1", "Prostate"), ("2", "Urethra"), ("3", "Rectum")] {
-        type_into(&mut driven, label, name);
+        driven.type_into(label, name);
     }
-    wait_for(&mut driven, "These structures can be the scene.");
+    driven.wait_for_label("These structures can be the scene.");
     driven.click("Save scene file");
-    wait_for(&mut driven, "Saved as");
+    driven.wait_for_label("Saved as");
     driven.picture("own-data-named");
     driven.click("Use these structures");
     driven.until("the scene", |app| {
@@ -110,7 +78,7 @@ fn labels_without_names_become_a_scene_that_can_be_planned() {
     let other = Driven::open_plain([1366.0, 768.0]);
     driven = other;
     driven.click("1  Choose the scene");
-    type_into(&mut driven, "elements", scene_file.to_str().expect("words"));
+    driven.type_into("elements", scene_file.to_str().expect("words"));
     driven.click("Load scene…");
     driven.until("the scene", |app| {
         app.link().scene().is_some_and(|s| s.header.structure_count == 3)

@@ -124,7 +124,7 @@ fn adding_moving_and_removing_needles_can_be_undone() {
     until_checked(&mut driven);
     assert!(problems_of_needles(&driven).is_empty());
     // One needle cannot cover the target, which is a problem of the plan.
-    wait_long_for_label(&mut driven, "target V100 is");
+    driven.wait_for_label("target V100 is");
     assert!(driven.window.query_by_label("The plan has no problems.").is_none());
     // Two to the patient's left, one up.
     for key in [Key::ArrowRight, Key::ArrowRight, Key::ArrowUp, Key::Enter] {
@@ -238,7 +238,7 @@ fn needles_go_in_one_after_the_other_by_one_key() {
     driven.press(Key::Y);
     driven.until("the first needle", |app| app.planner().progress().begun() == 1);
     wait_long(&mut driven, "the scripted hand", done);
-    wait_long_for_label(&mut driven, "All 2 needles are done.");
+    driven.wait_for_label("All 2 needles are done.");
     assert_eq!(seeds(driven.window.state()), 4);
     let progress = driven.window.state().planner().progress().clone();
     assert_eq!([0, 1].map(|n| progress.seeds_of(n, 4)), [0..2, 2..4]);
@@ -254,7 +254,7 @@ fn a_stopped_script_continues_in_this_window_and_the_next() {
     driven.click("Run all 2 needles");
     wait_long(&mut driven, "the first seed", |app| seeds(app) == 1);
     driven.click("Stop");
-    wait_long_for_label(&mut driven, "Continue at needle 1 of 2");
+    driven.wait_for_label("Continue at needle 1 of 2");
     driven.window.get_by_label("Start over");
     driven.click("Continue at needle 1 of 2");
     wait_long(&mut driven, "the third seed", |app| seeds(app) == 3);
@@ -264,7 +264,7 @@ fn a_stopped_script_continues_in_this_window_and_the_next() {
     driven.until("the plan", |app| {
         app.planner().plan().is_some_and(|plan| plan.needles.len() == 2)
     });
-    wait_long_for_label(&mut driven, "Continue at needle 2 of 2");
+    driven.wait_for_label("Continue at needle 2 of 2");
     let found = driven.window.state().planner().progress();
     assert_eq!(
         found.state(0),
@@ -273,7 +273,7 @@ fn a_stopped_script_continues_in_this_window_and_the_next() {
     );
     driven.click("Continue at needle 2 of 2");
     wait_long(&mut driven, "all needles", |app| app.planner().progress().done() == 2);
-    wait_long_for_label(&mut driven, "All 2 needles are done.");
+    driven.wait_for_label("All 2 needles are done.");
     let placed = driven.window.state().link().snapshot().expect("a snapshot").header;
     assert_eq!(placed.seed_count, 4);
     let dropped_at_m = placed.seeds[..4]
@@ -299,15 +299,6 @@ fn wait_long(driven: &mut Driven, what: &str, ready: impl Fn(&App) -> bool) {
     }
 }
 
-fn wait_long_for_label(driven: &mut Driven, words: &str) {
-    let start = Instant::now();
-    while driven.window.query_by_label_contains(words).is_none() {
-        assert!(start.elapsed() < Duration::from_secs(60), "waited in vain for {words}");
-        driven.window.run_steps(1);
-        std::thread::sleep(Duration::from_millis(10));
-    }
-}
-
 /// Returns the problems that the checks of needles and seeds found.
 fn problems_of_needles(driven: &Driven) -> Vec<String> {
     let implant = driven.window.state().planner().planning().implant;
@@ -325,7 +316,7 @@ fn an_automatic_plan_covers_the_target_without_problems() {
     let planned = plan(&driven);
     assert!(planned.needles.iter().all(|n| n.hole.is_some() && !n.seeds.is_empty()));
     let prescription = format!("{} seeds of I-125 6711, 145 Gy", planned.seed_count());
-    wait_long_for_label(&mut driven, &prescription);
+    driven.wait_for_label(&prescription);
     // Guards against a violated dose limit next to "The plan has no problems.".
     let broken = [" %, above", " Gy, above", " %, below", " Gy, below"];
     let is_broken = broken

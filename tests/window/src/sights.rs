@@ -4,30 +4,8 @@ use crate::driven::Driven;
 use crate::plan::{header, plan_through, put};
 use egui::Color32;
 use egui_kittest::kittest::Queryable;
+use stylet_test_kit::sight::{self, Matrix, SIGHTS};
 use stylet_tests::{Core, scratch};
-
-type Matrix = [[f64; 3]; 3];
-
-/// Deuteranopia and protanopia in linear sRGB (Machado, Oliveira and Fernandes 2009, table 1 at severity 1).
-const SIGHTS: [(&str, Matrix); 3] = [
-    ("normal", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
-    (
-        "deuteranopia",
-        [
-            [0.367_322, 0.860_646, -0.227_968],
-            [0.280_085, 0.672_501, 0.047_413],
-            [-0.011_820, 0.042_940, 0.968_881],
-        ],
-    ),
-    (
-        "protanopia",
-        [
-            [0.152_286, 1.052_583, -0.204_868],
-            [0.114_503, 0.786_281, 0.099_216],
-            [-0.003_882, -0.048_116, 1.051_998],
-        ],
-    ),
-];
 
 /// Distance of a pixel from the colour of its line: most of a line is not blended with the grey below.
 const OF_LINE: f64 = 6.0;
@@ -39,41 +17,16 @@ const LEAST_PIXELS: usize = 60;
 const MISTAKEN: f64 = 0.02;
 
 /// Returns the color as this sight sees it, sRGB.
-fn seen([r, g, b]: [u8; 3], sight: &Matrix) -> [u8; 3] {
-    let linear = |c: u8| match f64::from(c) / 255.0 {
-        c if c <= 0.040_45 => c / 12.92,
-        c => ((c + 0.055) / 1.055).powf(2.4),
-    };
-    let coded = |c: f64| match c.clamp(0.0, 1.0) {
+fn seen(color: [u8; 3], of: &Matrix) -> [u8; 3] {
+    let coded = |c: f64| match c {
         c if c <= 0.003_130_8 => 12.92 * c,
         c => 1.055 * c.powf(1.0 / 2.4) - 0.055,
     };
-    let of = [r, g, b].map(linear);
-    sight.map(|row| (255.0 * coded(row.iter().zip(of).map(|(a, c)| a * c).sum())).round() as u8)
-}
-
-/// Returns L*, a*, b* (CIE 1976, D65).
-fn lab(color: [u8; 3]) -> [f64; 3] {
-    let [r, g, b] = color.map(|c| match f64::from(c) / 255.0 {
-        c if c <= 0.040_45 => c / 12.92,
-        c => ((c + 0.055) / 1.055).powf(2.4),
-    });
-    let f = |t: f64| {
-        if t > 0.008_856 {
-            t.cbrt()
-        } else {
-            7.787 * t + 16.0 / 116.0
-        }
-    };
-    let x = f((0.4124 * r + 0.3576 * g + 0.1805 * b) / 0.950_47);
-    let y = f(0.2126 * r + 0.7152 * g + 0.0722 * b);
-    let z = f((0.0193 * r + 0.1192 * g + 0.9505 * b) / 1.088_83);
-    [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+    sight::seen(sight::linear(color), of).map(|c| (255.0 * coded(c)).round() as u8)
 }
 
 fn apart(a: [u8; 3], b: [u8; 3]) -> f64 {
-    let (a, b) = (lab(a), lab(b));
-    (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt()
+    sight::apart(sight::linear(a), sight::linear(b))
 }
 
 fn rgb(color: Color32) -> [u8; 3] {
@@ -97,12 +50,7 @@ fn lines_of_a_picture_are_told_apart_by_every_sight() {
     let planned = plan_through(&header(&driven), &["F6", "H6", "F8", "H8", "G9", "E7", "I7"], 4);
     put(&mut driven, "ui-sights", &planned);
     driven.until("the dose", |app| app.planner().planning().implant.is_some());
-    let begun = std::time::Instant::now();
-    while driven.window.query_by_label_contains("seeds of I-125 6711").is_none() {
-        assert!(begun.elapsed().as_secs() < 60, "no dose");
-        driven.window.run_steps(1);
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
+    driven.wait_for_label("seeds of I-125 6711");
     driven.come_to_rest();
     let picture = driven.picture("sights");
     let lines = host_ui::colors_of_lines().into_iter();
@@ -120,7 +68,7 @@ fn lines_of_a_picture_are_told_apart_by_every_sight() {
             }
         }
     }
-    for (sight, matrix) in &SIGHTS {
+    for (of, matrix) in &SIGHTS {
         let mut as_seen = picture.clone();
         for pixel in as_seen.pixels_mut() {
             let [r, g, b, a] = pixel.0;
@@ -128,7 +76,7 @@ fn lines_of_a_picture_are_told_apart_by_every_sight() {
             pixel.0 = [r, g, b, a];
         }
         as_seen
-            .save(scratch(&format!("picture-sights-{sight}")).join("sights.png"))
+            .save(scratch(&format!("picture-sights-{of}")).join("sights.png"))
             .expect("saved");
         for ((name, _), of_line) in lines.iter().zip(&pixels).filter(|(_, of)| of.len() >= LEAST_PIXELS) {
             let line = lines.iter().position(|(other, _)| other == name).expect("there");
@@ -137,12 +85,12 @@ fn lines_of_a_picture_are_told_apart_by_every_sight() {
                 .filter(|pixel| nearest(seen(**pixel, matrix), &lines, matrix).0 != line);
             let mistaken = mistaken.count();
             println!(
-                "{sight}: {name}: {mistaken} of {} pixels look like another line",
+                "{of}: {name}: {mistaken} of {} pixels look like another line",
                 of_line.len()
             );
             assert!(
                 (mistaken as f64) < MISTAKEN * of_line.len() as f64,
-                "{sight}: {name}: {mistaken}"
+                "{of}: {name}: {mistaken}"
             );
         }
     }

@@ -21,8 +21,8 @@ pub struct Drops {
     pub entry_m: [f64; 3],
     /// Unit vector into the body.
     pub direction: [f64; 3],
-    /// Distance from the entry at which the needle leaves the middle of each seed, deepest first; its tip is half a seed
-    /// deeper.
+    /// Distance from the entry at which the needle leaves the middle of each seed, deepest first; its tip is half a
+    /// seed deeper.
     pub along_m: Vec<f64>,
     /// Distance from the entry to which the tip is drawn back after the last drop, m.
     pub retract_to_m: f64,

@@ -109,7 +109,7 @@ pub fn foot_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     force_ui(ui, shown, actions);
     let kept = (shown.removed > 0).then(|| {
         let seeds = counted(shown.removed, "seed");
-        Note::done(format!("Ctrl+Z restores the {seeds} of before the reset."))
+        Note::done(format!("Ctrl+Z restores the {seeds} that the reset removed."))
     });
     let Some(note) = shown.note.as_ref().or(kept.as_ref()) else {
         return;

@@ -157,8 +157,8 @@ fn latest(measured: &Measured) -> Vec<Late> {
     .collect()
 }
 
-/// Returns the cause shown by the trace; if it does not cover the tick, a thread that preempts the loop, or what the gap
-/// watch saw.
+/// Returns the cause shown by the trace; if it does not cover the tick, a thread that preempts the loop, or what the
+/// gap watch saw.
 fn cause(measured: &Measured, tick: &LateTick) -> String {
     let outliers = measured.trace.iter().flat_map(|t| &t.outliers);
     let traced = outliers.into_iter().find(|o| o.due_ns == tick.due_ns);

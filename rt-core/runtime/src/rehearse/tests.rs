@@ -289,8 +289,8 @@ fn seeds_rest_at_any_speed(tissue: TissueKind) {
             assert!(off.norm() < 15e-3, "{off:?}");
         }
     }
-    // The hand turns up to 0.6 mm beyond its goal, by its speed; a seed in stretched tissue follows that, one in tissue that
-    // sticks does not.
+    // The hand turns up to 0.6 mm beyond its goal, by its speed; a seed in stretched tissue follows that, one in
+    // tissue that sticks does not.
     let apart_m = |a: &[(SeedPose, f64)], b: &[(SeedPose, f64)]| {
         let apart = a.iter().zip(b).map(|((a, at_m), (b, bt_m))| {
             let (seed_m, turn_m) = (a.position_m[2] - b.position_m[2], at_m - bt_m);

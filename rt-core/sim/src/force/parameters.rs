@@ -8,7 +8,8 @@ use crate::line::{NeedleBending, PronyTerm};
 use crate::needle::Layers;
 use crate::settings::{Problem, Problems};
 
-/// Beyond it a stuck shaft oscillates at 1 kHz in the lightest hand, without any delay (`tests/physics/src/envelope.rs`).
+/// Beyond it a stuck shaft oscillates at 1 kHz in the lightest hand, without any delay
+/// (`tests/physics/src/envelope.rs`).
 pub const MAX_STICK_STIFFNESS_N_PER_M: f64 = 8000.0;
 
 /// Coefficients of eq. 8-10, and the gate behind them.

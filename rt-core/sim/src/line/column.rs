@@ -1,7 +1,7 @@
 //! Column of seeds in the track of a needle: they lie one behind the other, and none passes another.
 //!
-//! Derivation in `docs/physics/seeds.md`, *Seeds in a track*. Places are those of the deeper end of each seed, along the
-//! line in the tissue at rest.
+//! Derivation in `docs/physics/seeds.md`, *Seeds in a track*. Places are those of the deeper end of each seed, along
+//! the line in the tissue at rest.
 
 use super::ready::HandLine;
 use super::stations::NEEDLE_RADIUS_M;

@@ -63,8 +63,8 @@ impl NearTip {
     }
 }
 
-/// Returns the integral, along the needle's surface from the sphere's middle on, of how an evenly loaded sphere moves an
-/// endless medium; over `1 / (16 pi G (1 - nu))`.
+/// Returns the integral, along the needle's surface from the sphere's middle on, of how an evenly loaded sphere moves
+/// an endless medium; over `1 / (16 pi G (1 - nu))`.
 fn integral_of_sphere(sphere_m: f64, needle_m: f64, nu: f64, z_m: f64) -> f64 {
     // Inside, the sphere moves as a rigid one.
     let rim_m = (sphere_m * sphere_m - needle_m * needle_m).max(0.0).sqrt();

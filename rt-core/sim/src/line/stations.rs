@@ -183,8 +183,8 @@ impl Stations {
         (cube_m.powi(2) - SPREAD * lattice_spacing_m.powi(2)).max(0.0).sqrt()
     }
 
-    /// Returns the radius of the sphere that this box moves tissue as: of the tip's, or of the smallest that the lattice
-    /// can load.
+    /// Returns the radius of the sphere that this box moves tissue as: of the tip's, or of the smallest that the
+    /// lattice can load.
     fn patch_radius_m(&self, lattice_spacing_m: f64) -> f64 {
         let least_m = SPREAD.sqrt() * lattice_spacing_m / CUBE_PER_RADIUS;
         self.settings.tip_radius_m.max(least_m)

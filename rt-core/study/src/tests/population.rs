@@ -6,8 +6,8 @@ use crate::Study;
 use stylet_insertions::{Insertion, Seed};
 use stylet_shm_schema::SEED_LENGTH_M;
 
-/// The next seed used to pass the last one: 65 % of loose neighbours planned 10 mm apart rested less than a seed's length
-/// apart.
+/// The next seed used to pass the last one: 65 % of loose neighbours planned 10 mm apart rested less than a seed's
+/// length apart.
 #[test]
 fn no_two_seeds_of_a_population_rest_nearer_than_touching() {
     let short = Study {

@@ -18,8 +18,8 @@ const IN_M: [f64; 3] = [10e-3, 20e-3, 30e-3];
 /// Friction in N/m and toughness in J/m2.
 type Case = [f64; 2];
 
-/// What a needle shows: offsets from plan in mm, deepest first; total and tip force in N on the way in and at the drops;
-/// mean displacement of the gland along the needle in mm; displacement of cells in mm at the deepest place.
+/// What a needle shows: offsets from plan in mm, deepest first; total and tip force in N on the way in and at the
+/// drops; mean displacement of the gland along the needle in mm; displacement of cells in mm at the deepest place.
 #[derive(Default)]
 struct Shown {
     loose_mm: Vec<f64>,

@@ -14,8 +14,8 @@ impl Digest {
     }
 }
 
-/// Digests tip, force, torque, depth, speed and displacement of every tick, then the deeper ends of the seeds, which were
-/// their places once, and the largest force. Adds every 200th tick and those ends to a trace.
+/// Digests tip, force, torque, depth, speed and displacement of every tick, then the deeper ends of the seeds, which
+/// were their places once, and the largest force. Adds every 200th tick and those ends to a trace.
 fn digest(stage: &mut Stage, run: &NeedleRehearsal, case: f64, trace: &mut Vec<Vec<f64>>) -> u64 {
     let active = activate(&ParameterSet::default(), &stage.device).expect("valid");
     let mut world = stage.world.take().expect("given back");

@@ -43,7 +43,8 @@ pub fn seeds_and_turns(stage: &mut Stage, run: &NeedleRehearsal) -> Vec<(SeedPos
     seeds.into_iter().zip(turns_m).collect()
 }
 
-/// The next seed used to pass the last one: in tissue that sticks, two seeds dropped 7 mm apart came to rest at one place.
+/// The next seed used to pass the last one: in tissue that sticks, two seeds dropped 7 mm apart came to rest at one
+/// place.
 #[test]
 fn no_two_seeds_of_a_needle_rest_nearer_than_touching() {
     let (mut stage, stop) = (stage(), AtomicBool::new(false));
@@ -74,8 +75,8 @@ fn no_two_seeds_of_a_needle_rest_nearer_than_touching() {
     assert!(touching > 0);
 }
 
-/// Compensation drops seeds 0.15 mm apart to find edges. Seeds with a body lay in a column, so every drop seemed to be on
-/// an edge.
+/// Compensation drops seeds 0.15 mm apart to find edges. Seeds with a body lay in a column, so every drop seemed to
+/// be on an edge.
 #[test]
 fn points_lie_nearer_to_each_other_than_seeds() {
     let (mut stage, stop) = (stage(), AtomicBool::new(false));

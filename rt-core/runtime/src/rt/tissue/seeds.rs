@@ -68,8 +68,8 @@ impl TissueLoop {
         Ok(())
     }
 
-    /// Places a seed behind those that lie in the track at the tip, which the stylet may push on; returns its front, from
-    /// the entry along the line.
+    /// Places a seed behind those that lie in the track at the tip, which the stylet may push on; returns its front,
+    /// from the entry along the line.
     fn join_column(&mut self, line: &Line) -> f64 {
         let body = &self.world.scene.body;
         let (tip_m, [axis, first, second]) = (self.state.loads.tip_material_m, line.axes.map(Vector3::from));

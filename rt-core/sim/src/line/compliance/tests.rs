@@ -180,8 +180,8 @@ fn the_tip_moves_tissue_as_a_rigid_sphere_does() {
     }
 }
 
-/// A tip of 0.6 of a cell, by patches of one to three cells: what the lattice moves of it and what it lacks add up to the
-/// closed form. Without the missing part the tip is three times too stiff.
+/// A tip of 0.6 of a cell, by patches of one to three cells: what the lattice moves of it and what it lacks add up to
+/// the closed form. Without the missing part the tip is three times too stiff.
 #[test]
 fn a_narrow_tip_moves_tissue_as_a_sphere_of_its_radius_whatever_its_patch() {
     const CELLS: usize = 32;

@@ -27,7 +27,8 @@ pub(in crate::line) fn press(model: &LineModel, state: &mut LineState, membrane:
         .compliance
         .tip_missing_m_per_n(state.tip_range.clone(), &state.tip_weights);
     let kept = membrane.and_then(|n| model.kept_of_dent(n, state.tip_own - near));
-    // A membrane that is stiffer than the tissue spreads the load over the patch, and no tissue is dented more narrowly.
+    // A membrane that is stiffer than the tissue spreads the load over the patch, and no tissue is dented more
+    // narrowly.
     let near = if kept.is_some_and(|kept| kept < 1.0) { near } else { 0.0 };
     let near_m = state.near_m(model);
     let is_met = held_by != state.tip.held_by;

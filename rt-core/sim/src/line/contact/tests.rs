@@ -245,7 +245,8 @@ fn half_the_tick_and_half_the_spacing_change_little() {
     println!("ours   {}\nhalves {}", figures(&ours), figures(&halves));
     println!("spacing: seeds {:.4} mm, force {:.3} %", 1e3 * place_m, 100.0 * force);
     assert!(by_tick.0 < 0.1e-3 && by_tick.1 < 0.02);
-    // The bar of ADR 10 is 0.1 mm, and is missed by 0.3 mm on the way in: the end of the shaft is half a station or more.
+    // The bar of ADR 10 is 0.1 mm, and is missed by 0.3 mm on the way in: the end of the shaft is half a station or
+    // more.
     assert!(place_m < 0.41e-3 && force < 0.02);
 }
 

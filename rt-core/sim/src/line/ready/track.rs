@@ -31,8 +31,8 @@ impl HandLine {
         })
     }
 
-    /// Finds `track` open where the needle goes in it all the way, within the radius of a needle; does not allocate. For a line
-    /// that no needle is on.
+    /// Finds `track` open where the needle goes in it all the way, within the radius of a needle; does not allocate.
+    /// For a line that no needle is on.
     pub fn open_track(&mut self, track: &Track) {
         let axis = self.line.axes[0];
         let off_m = |along_m: f64| {

@@ -90,8 +90,8 @@ impl<T: Compiled> FemModel<T> {
         T::model(lattice, of, settings, &|_| false)
     }
 
-    /// Makes the same in layers, the innermost first, whose outside is fixed. They lie on the faces that rest on fat; if
-    /// there are none, springs of `foundation_pa_per_m` do.
+    /// Makes the same in layers, the innermost first, whose outside is fixed. They lie on the faces that rest on fat;
+    /// if there are none, springs of `foundation_pa_per_m` do.
     pub fn in_layers(
         lattice: &Lattice,
         of: &Arc<Lattice>,

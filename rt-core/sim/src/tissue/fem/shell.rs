@@ -18,8 +18,8 @@ use stylet_settings::ProblemList;
 use surface::{PartOfSurface, Surface};
 
 impl<T: Real> FemModel<T> {
-    /// Makes the body of `lattice` in the elements of `of`, in layers where there are any: then its springs are as stiff as
-    /// these against translation, the mean over all directions.
+    /// Makes the body of `lattice` in the elements of `of`, in layers where there are any: then its springs are as
+    /// stiff as these against translation, the mean over all directions.
     pub(super) fn of_layered(
         lattice: &Lattice,
         of: &Arc<Lattice>,
