@@ -357,6 +357,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema/anatomy",
             "shm-schema/manual",
             "shm-schema/random",
+            "tests/kit",
         ],
         never: &[],
         not_itself: &[PORTS],
