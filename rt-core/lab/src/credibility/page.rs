@@ -1,7 +1,7 @@
 //! The credibility file as a page; every id is a link target.
 
 use super::runs::Run;
-use super::tables::{Category, Hazard};
+use super::tables::{Category, Factor, Hazard, PROBABILITIES, Probability, SEVERITIES, Severity, risk};
 use super::{Credibility, Traced};
 use crate::provenance::Package;
 use maud::{Markup, html};
@@ -17,7 +17,12 @@ pub fn page(c: &Credibility) -> String {
         h2 { "Context of use" }
         @for (heading, text) in c.context { h3 { (heading) } p { (text) } }
         h2 { "Hazards" }
+        p class="faint" {
+            "Severity and probability are the authors' estimates, in the levels of ISO/TR 24971: there are no figures from use. "
+            "Whether a risk is acceptable is for whoever uses Stylet to decide."
+        }
         (hazards(c))
+        (matrix())
         h2 { "Requirements, hazards, tests, runs" }
         p class="faint" {
             "A test is named by its file in the repository and its function; all of them run in " code { "make test-all" } ". "
@@ -50,16 +55,46 @@ fn hazards(c: &Credibility) -> Markup {
     let row = |h: &Hazard| {
         let held_by = c.requirements.iter().filter(|r| r.requirement.hazards.contains(&h.id));
         let held_by = html! { @for r in held_by { (link(&r.requirement.id)) " " } };
+        let level = |probability| html! { (word(probability)) br; strong { (risk(h.severity, probability)) " risk" } };
         vec![
             anchor(&h.id),
-            cell(&h.hazard),
-            cell(&h.situation),
-            cell(&h.harm),
+            html! { (h.hazard) br; span class="faint" { (h.situation) } },
+            html! { (h.harm) br; span class="faint" { (word(h.severity)) } },
+            level(h.before),
             held_by,
+            level(h.after),
+            cell(&h.remains),
         ]
     };
     let rows: Vec<_> = c.hazards.iter().map(row).collect();
-    table(&["id", "hazard", "situation", "harm", "held off by"], &rows, &[])
+    let head = [
+        "id",
+        "hazard and situation",
+        "harm and severity",
+        "before controls",
+        "controls",
+        "residual risk",
+        "what remains",
+    ];
+    table(&head, &rows, &[])
+}
+
+/// Writes a level as the file has it.
+fn word(level: impl std::fmt::Debug) -> String {
+    format!("{level:?}").to_lowercase()
+}
+
+fn matrix() -> Markup {
+    let row = |severity: Severity| {
+        let risks = PROBABILITIES.iter().map(|p: &Probability| cell(risk(severity, *p)));
+        std::iter::once(cell(word(severity))).chain(risks).collect::<Vec<_>>()
+    };
+    let rows: Vec<_> = SEVERITIES.iter().rev().map(|s| row(*s)).collect();
+    let head: Vec<String> = PROBABILITIES.iter().map(word).collect();
+    let head: Vec<&str> = std::iter::once("risk by severity and probability")
+        .chain(head.iter().map(String::as_str))
+        .collect();
+    html! { details { summary { "How a risk is rated" } (table(&head, &rows, &[])) } }
 }
 
 fn requirements(c: &Credibility) -> Markup {
@@ -112,7 +147,7 @@ fn categories(c: &Credibility) -> Markup {
             cell(k.number),
             cell(&k.name),
             html! { @for (what, place) in &k.there { div { (what) " " span class="faint" { (place) } } } },
-            html! { @if k.missing.is_empty() { span class="na" { "nothing known" } } @else { (k.missing) } },
+            missing(&k.missing),
         ]
     };
     let rows: Vec<_> = c.categories.iter().map(row).collect();
@@ -124,12 +159,24 @@ fn categories(c: &Credibility) -> Markup {
 }
 
 fn factors(c: &Credibility) -> Markup {
-    let rows: Vec<_> = c
-        .factors
-        .iter()
-        .map(|f| vec![cell(&f.activity), cell(&f.name), cell(&f.what)])
-        .collect();
-    table(&["activity", "factor", "state"], &rows, &[])
+    let place = |of: &String| {
+        let is_requirement = c.requirements.iter().any(|r| r.requirement.id == *of);
+        html! { div { @if is_requirement { (link(of)) } @else { span class="faint" { (of) } } } }
+    };
+    let row = |f: &Factor| {
+        vec![
+            html! { (f.name) br; span class="faint" { (f.activity) } },
+            html! { @if f.what.is_empty() { span class="na" { "nothing" } } @else { (f.what) } },
+            html! { @for of in &f.evidence { (place(of)) } },
+            missing(&f.missing),
+        ]
+    };
+    let rows: Vec<_> = c.factors.iter().map(row).collect();
+    table(&["factor", "what was done", "evidence", "what is missing"], &rows, &[])
+}
+
+fn missing(text: &str) -> Markup {
+    html! { @if text.is_empty() { span class="na" { "nothing known" } } @else { (text) } }
 }
 
 fn packages(c: &Credibility) -> Markup {

@@ -18,7 +18,7 @@ pub struct Tables {
     pub factors: Vec<Factor>,
 }
 
-/// Hazard in the words of ISO 14971: hazard, situation, harm.
+/// Hazard in the words of ISO 14971: hazard, situation, harm, and the risk of it before and after its controls.
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Hazard {
@@ -26,6 +26,60 @@ pub struct Hazard {
     pub hazard: String,
     pub situation: String,
     pub harm: String,
+    pub severity: Severity,
+    /// Probability of the harm without the requirements that control the hazard.
+    pub before: Probability,
+    /// Probability with them.
+    pub after: Probability,
+    /// What the requirements do not control.
+    pub remains: String,
+}
+
+/// Severity of a harm, by the five qualitative levels of ISO/TR 24971.
+#[derive(Clone, Copy, Debug, Deserialize, Eq, Ord, PartialEq, PartialOrd, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    Negligible,
+    Minor,
+    Serious,
+    Critical,
+    Catastrophic,
+}
+
+/// Probability of a harm, by the five levels of ISO/TR 24971.
+#[derive(Clone, Copy, Debug, Deserialize, Eq, Ord, PartialEq, PartialOrd, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Probability {
+    Improbable,
+    Remote,
+    Occasional,
+    Probable,
+    Frequent,
+}
+
+/// Levels in the order of both scales, lowest first.
+pub const SEVERITIES: [Severity; 5] = [
+    Severity::Negligible,
+    Severity::Minor,
+    Severity::Serious,
+    Severity::Critical,
+    Severity::Catastrophic,
+];
+pub const PROBABILITIES: [Probability; 5] = [
+    Probability::Improbable,
+    Probability::Remote,
+    Probability::Occasional,
+    Probability::Probable,
+    Probability::Frequent,
+];
+
+/// Returns the risk of a harm: low, medium or high.
+pub fn risk(severity: Severity, probability: Probability) -> &'static str {
+    match severity as u8 + probability as u8 {
+        0..=2 => "low",
+        3..=4 => "medium",
+        _ => "high",
+    }
 }
 
 /// Requirement on the software that controls hazards.
@@ -58,5 +112,10 @@ pub struct Category {
 pub struct Factor {
     pub activity: String,
     pub name: String,
+    /// Empty if nothing was done.
     pub what: String,
+    /// Ids of requirements, and places in the repository.
+    pub evidence: Vec<String>,
+    /// Empty if nothing is known to be missing.
+    pub missing: String,
 }

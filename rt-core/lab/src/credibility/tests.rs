@@ -1,7 +1,7 @@
 //! Every reference in the credibility file resolves: ids, tests and paths exist.
 
 use super::runs;
-use super::tables::TABLES;
+use super::tables::{TABLES, risk};
 use super::{credibility, page};
 use crate::provenance::sha256;
 use crate::report::OLD_SCHEMA;
@@ -66,6 +66,23 @@ fn places_of_evidence_exist_and_both_lists_are_whole() {
             "{what}: {place}"
         );
     }
+    for factor in &TABLES.factors {
+        assert_eq!(factor.what.is_empty(), factor.evidence.is_empty(), "{}", factor.name);
+        assert!(!factor.what.is_empty() || !factor.missing.is_empty(), "{}", factor.name);
+        for of in &factor.evidence {
+            let is_requirement = TABLES.requirements.iter().any(|r| r.id == *of);
+            assert!(is_requirement || repository(of).exists(), "{}: {of}", factor.name);
+        }
+    }
+}
+
+#[test]
+fn controls_lower_every_risk_and_leave_none_high() {
+    for h in &TABLES.hazards {
+        assert!(h.after < h.before, "{}", h.id);
+        assert_ne!(risk(h.severity, h.after), "high", "{}", h.id);
+        assert!(!h.remains.is_empty(), "{}", h.id);
+    }
 }
 
 #[test]
@@ -77,6 +94,7 @@ fn the_page_says_what_it_is_not() {
         "IEC 62304",
         "ISO 14971",
         "IEC 60601-1",
+        "there are no figures from use",
         "no run given",
     ] {
         assert!(page.contains(words), "{words}");
