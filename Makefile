@@ -11,7 +11,7 @@ COMPRESSED = --features stylet-files/compressed
 PACKAGED = $(COMPRESSED) --features host-ui/screen-reader
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release reproducible sbom package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -39,8 +39,19 @@ test-all: test ## Then test the products, and the programs with whole processes,
 	$(CARGO) test --profile quick $(REST) $(RUNNER)
 	$(CARGO) test --profile quick -p stylet-files --lib $(COMPRESSED) -- compressed::
 
+# No path of the builder goes into the programs: the same sources give the same bytes in any folder.
+REMAPPED = CFLAGS="-ffile-prefix-map=$(CARGO_FOLDER)=/cargo" \
+    RUSTFLAGS="--remap-path-prefix=$(CURDIR)=/stylet --remap-path-prefix=$(CARGO_FOLDER)=/cargo"
+CARGO_FOLDER = $(or $(CARGO_HOME),$(HOME)/.cargo)
+
 build-release: ## Build the programs as the packages hold them, with every dependency optimised
-	$(CARGO) build --release --workspace $(SIMULATOR) $(PRODUCTS) $(PACKAGED)
+	$(REMAPPED) $(CARGO) build --release --locked --workspace $(SIMULATOR) $(PRODUCTS) $(PACKAGED)
+
+reproducible: ## Build the last commit twice in folders of other names, and compare the programs byte by byte (some 30 minutes)
+	docs/tools/reproducible
+
+sbom: ## Write the software bill of materials of each program (CycloneDX 1.5), into target/package
+	docs/tools/sbom
 
 package: deps-package build-release ## Build the Debian packages of both programs, into target/package
 	docs/tools/package "$(SHIPPED)"
