@@ -21,7 +21,7 @@ pub const KEYS: [(&str, &str); 26] = [
     ("Space", "drop a seed at the tip"),
     (
         "Ctrl+Z",
-        "undo the last seed, a reset or a change of the plan; with Shift redo it",
+        "undo the last seed, a reset or a change of the plan; with Shift redo a change of the plan",
     ),
     (
         "Arrows, Enter",
@@ -76,6 +76,13 @@ const DRIVE_M_PER_S: f64 = 0.04;
 /// drop a seed.
 pub fn read(ctx: &egui::Context) -> Keys {
     let mut keys = Keys::default();
+    // A question waits for its answer: nothing but the force may change, and that only to off.
+    if ctx.memory(|m| m.top_modal_layer().is_some()) {
+        if ctx.input(|i| fresh_press(i, Modifiers::NONE, Key::D)) {
+            keys.actions.push(Action::Send(Request::Disengage));
+        }
+        return keys;
+    }
     if ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F1)) {
         keys.actions.push(Action::ToggleHelp);
     }
@@ -241,6 +248,35 @@ mod tests {
         frame(press([110.0, 110.0]), true);
         frame(Vec::new(), false);
         assert_eq!(frame(e(), true), [Action::Send(Request::Engage)], "it was closed");
+    }
+
+    /// Guards against a seed that was dropped behind the question whether to remove all.
+    #[test]
+    fn behind_a_question_only_the_force_goes_off() {
+        let ctx = egui::Context::default();
+        let mut frame = |key: Key| {
+            let event = Event::Key {
+                key,
+                physical_key: None,
+                pressed: true,
+                repeat: false,
+                modifiers: Modifiers::NONE,
+            };
+            let input = RawInput {
+                events: vec![event],
+                ..RawInput::default()
+            };
+            let mut keys = Keys::default();
+            let _ = ctx.run_ui(input, |ui| {
+                keys = read(ui.ctx());
+                egui::Modal::new(egui::Id::unique("question")).show(ui.ctx(), |ui| ui.label("Reset?"));
+            });
+            (keys.actions, keys.drive_m_per_s)
+        };
+        frame(Key::A);
+        assert_eq!(frame(Key::Space), (vec![], 0.0));
+        assert_eq!(frame(Key::W), (vec![], 0.0));
+        assert_eq!(frame(Key::D).0, [Action::Send(Request::Disengage)]);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::debrief::folder_of;
 use super::drive::{BEFORE_ENTRY_M, Drive, Goal};
 use super::{App, Waiting};
-use crate::action::Action;
+use crate::action::{Action, PlanAction};
 use crate::panel::question::{Begin, Question};
 use crate::panel::workflow::{Undo, next_action, undo_action};
 use crate::planner::Edit;
@@ -41,6 +41,8 @@ impl App {
     }
 
     pub(super) fn load_builtin(&mut self, number: usize) {
+        // What was said of a file is of the scene before.
+        self.shown.load = LoadState::Idle;
         self.send("Built-in scene", &Request::LoadBuiltinScene(number as u32));
     }
 
@@ -70,6 +72,14 @@ impl App {
 
     /// Executes a request, or asks first if it removes what is in the tissue.
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
+        // Until a question is answered the needle may only be stopped, and the force only go off.
+        let passes = matches!(
+            action,
+            Action::Answer(_) | Action::StopRun | Action::Send(Request::Disengage)
+        );
+        if self.question.is_some() && !passes {
+            return;
+        }
         let question = Question::before(&action, &self.shown).filter(|_| self.run.is_none() && !self.watches());
         match question {
             Some(question) => self.question = Some(question),
@@ -87,6 +97,10 @@ impl App {
                 self.execute(*action, ctx);
                 // Not before: no run begins while the planner writes.
                 self.save_plan(&folder);
+            }
+            Some(Question::Replace(path)) => {
+                self.workflow.plan.own_file = Some(path.clone());
+                self.act_on_plan(PlanAction::Export(path));
             }
             None => {}
         }
@@ -156,7 +170,7 @@ impl App {
             Action::Redo if self.draws() => self.planner.draw(Edit::Redo),
             Action::Undo if self.edits_plan() => self.planner.undo(),
             Action::Redo if self.edits_plan() => self.planner.redo(),
-            Action::Redo => {}
+            Action::Redo => self.refuse("Only a change of the plan can be redone, while its step is open."),
             Action::Undo => match undo_action(&self.shown) {
                 Some(Undo::Seed) => self.send("Undo seed", &Request::UndoSeed),
                 Some(Undo::Reset) => self.send("Undo reset", &Request::UndoSeed),

@@ -5,6 +5,8 @@ use std::fs::File;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use stylet_host::core_args::SceneChoice;
+use stylet_shm_schema::BUILTIN_SCENES;
 
 const PROGRAM: &str = "rt-core";
 
@@ -30,6 +32,7 @@ impl App {
     pub(super) fn start_core(&mut self) {
         let program = program();
         self.started_core = None;
+        self.files.first_scene = self.present_scene();
         let started = Command::new(&program)
             .args(["--instance", &self.shown.instance, "--rt-if-allowed"])
             .stdin(Stdio::null())
@@ -50,6 +53,15 @@ impl App {
 }
 
 impl App {
+    /// Returns how the scene on display is loaded again; `None` before the first one, and if another window sent it.
+    fn present_scene(&self) -> Option<SceneChoice> {
+        let name = self.shown.scene.as_ref()?.name.read();
+        let built_in = BUILTIN_SCENES.iter().position(|scene| *scene == name);
+        self.scene_file()
+            .map(SceneChoice::File)
+            .or(built_in.map(SceneChoice::BuiltIn))
+    }
+
     /// Says why the core that this window started has failed.
     pub(super) fn take_core(&mut self) {
         let Some(StartedCore(child)) = &mut self.started_core else {

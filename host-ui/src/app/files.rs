@@ -87,6 +87,8 @@ impl App {
             }
             Purpose::SavePlan | Purpose::SaveTable | Purpose::SaveRtPlan => {
                 self.workflow.plan.path = typed;
+                // The desktop's dialog asked.
+                self.workflow.plan.own_file = Some(path.clone());
                 Action::Plan(PlanAction::Export(path))
             }
         })

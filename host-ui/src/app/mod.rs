@@ -314,7 +314,10 @@ impl App {
                 ..Wish::REST
             };
         }
-        match (self.shown.has_focus, ctx.input(|i| i.modifiers.shift)) {
+        match (
+            self.shown.has_focus && self.question.is_none(),
+            ctx.input(|i| i.modifiers.shift),
+        ) {
             (false, _) => Wish::REST,
             (true, false) => self.shown.controllers.wish,
             (true, true) => self.shown.controllers.wish.slower(SLOW),

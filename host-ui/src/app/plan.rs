@@ -79,10 +79,17 @@ impl App {
             PlanAction::Cancel => planner.cancel(),
             PlanAction::Import(path) => {
                 if let Some(scene) = self.link.scene() {
+                    self.workflow.plan.own_file = Some(path.clone());
                     planner.import(path, scene.clone(), scene_file);
                 }
             }
-            PlanAction::Export(path) => planner.export(path, scene_file),
+            PlanAction::Export(path) if path.exists() && self.workflow.plan.own_file.as_ref() != Some(&path) => {
+                self.question = Some(Question::Replace(path));
+            }
+            PlanAction::Export(path) => {
+                self.workflow.plan.own_file = Some(path.clone());
+                planner.export(path, scene_file);
+            }
             PlanAction::ExportStudy => {
                 if let Some(scene) = self.link.scene() {
                     let folder = PathBuf::from(format!("out/study-{}", format::utc_now()));

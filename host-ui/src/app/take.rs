@@ -28,7 +28,13 @@ impl App {
         self.take_recording();
         self.link.poll();
         let plan_before = self.shown.plan.map(|p| p.generation);
+        let scene_before = self.shown.scene.map(|s| s.id());
+        let given_up_before = self.shown.given_up_at;
         self.shown.take(&self.link);
+        if self.shown.scene.map(|s| s.id()) != scene_before {
+            // The file of another scene's plan is not replaced by this one's.
+            self.workflow.plan.forget_file();
+        }
         self.leave_core();
         self.take_core();
         self.keep_of_ended_core();
@@ -52,6 +58,7 @@ impl App {
         self.take_answers();
         self.take_scene_file();
         self.advance_run();
+        self.take_given_up(given_up_before);
         self.take_plan();
         self.dose.take(self.link.scene(), &self.dose_request());
         self.shown.dose = self.dose.latest().cloned();
@@ -184,6 +191,19 @@ impl App {
             if let Some((image, scene)) = image {
                 self.show_image(image, &scene);
             }
+        }
+    }
+
+    /// Says why the needle stopped before its goal; a script starts again by itself.
+    fn take_given_up(&mut self, before: Option<u64>) {
+        /// Older than that, it was before this window.
+        const NEW_TICKS: u64 = 2_000;
+        let (at, Some(state)) = (self.shown.given_up_at, &self.shown.state) else {
+            return;
+        };
+        let is_new = at.is_some_and(|at| state.tick.saturating_sub(at) < NEW_TICKS) && at != before;
+        if is_new && self.run.is_none() && !self.watches() {
+            self.refuse("The needle was stopped: the PC was too busy to confirm its motion in time. Move it again.");
         }
     }
 

@@ -1,10 +1,12 @@
-//! Questions before what cannot be undone: removing what is in the tissue, and a run that would re-arm, because after a
-//! fault only a person turns the force on again.
+//! Questions before what cannot be undone: removing what is in the tissue, replacing a file, and a run that would
+//! re-arm, because after a fault only a person turns the force on again.
 
 use crate::action::Action;
 use crate::shown::Shown;
 use crate::words::counted;
 use egui::{Key, Modal, Modifiers};
+use std::path::PathBuf;
+use stylet_base::format::printable;
 use stylet_shm_schema::{Fault, Request};
 
 const LOAD: &str = "Load the scene";
@@ -25,6 +27,8 @@ pub enum Question {
     Rearm(Begin),
     /// An action that removes what is in the tissue, with its name.
     Remove(&'static str, Box<Action>),
+    /// Saving the plan as a file that is there and is not this plan's.
+    Replace(PathBuf),
 }
 
 impl Question {
@@ -81,6 +85,15 @@ pub fn question_ui(ctx: &egui::Context, shown: &Shown, question: Option<&Questio
                 "Leave the force off (N)",
             )
         }
+        Question::Replace(path) => (
+            "Replace the file?".to_owned(),
+            format!(
+                "{} exists, and was neither opened nor saved for this scene.",
+                printable(&path.display().to_string())
+            ),
+            "Replace (Y)".to_owned(),
+            "Keep the file (N)",
+        ),
         Question::Remove(name, action) => {
             let (text, no) = match in_tissue(shown) {
                 None => (

@@ -86,6 +86,8 @@ pub struct Shown {
     pub last_refusal: String,
     /// Last fault of this run without a re-arming; if the core ended, its reason.
     pub last_fault: String,
+    /// Tick at which the core last stopped the needle because the sender of its motion fell silent.
+    pub given_up_at: Option<u64>,
     /// Gamepads and 3D mice, and whether this window has the focus that they need.
     pub controllers: Latest,
     pub has_focus: bool,
@@ -137,6 +139,7 @@ impl Shown {
             self.snapshot_residual = Some(snapshot.header.residual);
         }
         self.take_removed(seeds_before, link);
+        self.take_given_up(link);
     }
 
     /// Returns the drawn place of a seed, which follows the body.

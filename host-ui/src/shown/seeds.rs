@@ -3,7 +3,7 @@
 use super::Shown;
 use stylet_host::link::Link;
 use stylet_implant::pairing::{self, SeedOffset};
-use stylet_shm_schema::{EventKind, PlannedSeed, SeedPose};
+use stylet_shm_schema::{Event, EventKind, PlannedSeed, SeedPose};
 
 impl Shown {
     /// Notes how many seeds a reset has just removed: the core restores them until another is dropped.
@@ -21,6 +21,13 @@ impl Shown {
         } else if before > 0 {
             self.removed = before;
         }
+    }
+
+    /// Notes when the core last stopped the needle before its goal.
+    pub(super) fn take_given_up(&mut self, link: &Link) {
+        const NEEDLES_HAND: u32 = 0;
+        let is_given_up = |e: &&Event| e.kind == EventKind::MotionGivenUp as u32 && e.code == NEEDLES_HAND;
+        self.given_up_at = link.events().iter().rev().find(is_given_up).map(|e| e.tick);
     }
 }
 

@@ -23,6 +23,7 @@ use stylet_files::Image;
 use stylet_host::link::{SceneModel, Snapshot};
 use stylet_imaging::fluoroscopy::DoseCounter;
 use stylet_imaging::ultrasound::View;
+use stylet_shm_schema::SceneHeader;
 
 /// Gap between two pictures.
 const GAP: f32 = 2.0;
@@ -83,11 +84,13 @@ impl Middle {
         self.body.take(model, snapshot);
         self.solid.take(shown, &self.body);
         self.slices.take(&self.body, &mut self.view);
-        if let Some(tip) = shown
-            .tip_m()
-            .filter(|tip| self.view.follow_tip && is_near_body(shown, tip))
-        {
-            self.view.cursor_m = Vector3::from(tip);
+        if let (true, Some(tip_m), Some(scene)) = (self.view.follow_tip, shown.tip_m(), &shown.scene) {
+            // A needle at its entry is in two of the planes; the third waits for it at the edge of the body.
+            for axis in 0..3 {
+                if near_body(scene, axis).contains(&tip_m[axis]) {
+                    self.view.cursor_m[axis] = tip_m[axis];
+                }
+            }
         }
     }
 
@@ -269,14 +272,10 @@ impl Middle {
     }
 }
 
-/// Returns whether the tip is near the body; a needle far outside would take the slices to empty
-/// space.
-fn is_near_body(shown: &Shown, tip_m: &[f64; 3]) -> bool {
+/// Returns the extent of the body along an axis, with a little more.
+fn near_body(scene: &SceneHeader, axis: usize) -> std::ops::RangeInclusive<f64> {
     const NEAR_M: f64 = 0.002;
-    shown
-        .scene
-        .as_ref()
-        .is_some_and(|s| (0..3).all(|a| (s.lower_m[a] - NEAR_M..=s.upper_m[a] + NEAR_M).contains(&tip_m[a])))
+    scene.lower_m[axis] - NEAR_M..=scene.upper_m[axis] + NEAR_M
 }
 
 /// Returns the point where the pictures of a layout meet.

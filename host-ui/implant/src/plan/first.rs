@@ -50,12 +50,12 @@ pub fn proposals(
     let aims = [
         (
             "Robust",
-            "Most trials with misplaced seeds meet a D90 of 90 % of the prescription.",
+            "95 % of trials with misplaced seeds meet a D90 of 90 % of the prescription; then the smallest V150.",
             objectives,
         ),
         (
             "Fewer needles",
-            "Robust as well, with as few needles as possible.",
+            "As robust, with as few needles as possible; its V150 may be larger.",
             &few,
         ),
         (

@@ -1,7 +1,7 @@
 //! Runs while a fault stands, and what removes an implant: the window asks, and nothing begins before the answer.
 
 use super::fixture::{Drawn, one_needle};
-use crate::action::Action;
+use crate::action::{Action, PlanAction};
 use crate::panel::question::Question;
 use std::path::PathBuf;
 use stylet_shm_schema::{Fault, Request, flags};
@@ -58,6 +58,16 @@ fn what_removes_seeds_says_so_and_waits_for_the_answer() {
             "{action:?}"
         );
         drawn.place("Keep the implant (N)");
+        // Keys and buttons of controllers do not reach the implant before the answer.
+        for action in [
+            Action::DropSeed,
+            Action::Undo,
+            Action::Send(Request::Engage),
+            Action::Insert,
+        ] {
+            drawn.app.act(action, &ctx);
+            assert!(drawn.app.waiting.is_empty() && drawn.app.question.is_some());
+        }
         let undone = match action {
             Action::Send(Request::Reset) => "Ctrl+Z restores the seeds until the next one is dropped.",
             _ => "This cannot be undone.",
@@ -96,4 +106,28 @@ fn another_scene_asks_while_the_needle_is_in_the_tissue() {
     // A reset only takes the needle's contact back.
     drawn.app.act(Action::Send(Request::Reset), &ctx);
     assert!(drawn.app.question.is_none());
+}
+
+/// Guards against the plan of one case that replaced that of another.
+#[test]
+fn a_plan_replaces_no_file_of_another_case_without_an_answer() {
+    let mut drawn = Drawn::new([1280.0, 720.0], 1.0);
+    let ctx = drawn.ctx.clone();
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("case7.toml");
+    std::fs::write(&path, "of another case").expect("written");
+    let save = || Action::Plan(PlanAction::Export(path.clone()));
+    drawn.app.act(save(), &ctx);
+    drawn.place("Replace the file?");
+    drawn.app.act(Action::Answer(false), &ctx);
+    assert_eq!(drawn.app.workflow.plan.own_file, None);
+    drawn.app.act(save(), &ctx);
+    drawn.app.act(Action::Answer(true), &ctx);
+    assert_eq!(drawn.app.workflow.plan.own_file.as_ref(), Some(&path));
+    // Now the file is this plan's.
+    drawn.app.act(save(), &ctx);
+    assert!(drawn.app.question.is_none());
+    drawn.app.workflow.plan.forget_file();
+    drawn.app.act(save(), &ctx);
+    assert!(drawn.app.question.is_some(), "of another scene");
 }

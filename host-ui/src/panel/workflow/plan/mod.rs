@@ -16,12 +16,15 @@ use crate::theme::Press;
 use crate::words::counted;
 pub(super) use card::plan_ui;
 use egui::Button;
+use std::path::PathBuf;
 use stylet_implant::plan::{Hole, ImplantPlan};
 
 /// Selection of the user in the plan.
 pub struct PlanState {
     /// Path of a plan file.
     pub path: String,
+    /// File that was opened or saved for this scene, which *Save* replaces without a question.
+    pub own_file: Option<PathBuf>,
     pub(super) hole: Hole,
     /// Selected needle, if it goes through no hole.
     by_hand: Option<usize>,
@@ -35,11 +38,19 @@ impl Default for PlanState {
     fn default() -> Self {
         Self {
             path: String::new(),
+            own_file: None,
             hole: Hole::middle(),
             by_hand: None,
             depth_m: None,
             listed: None,
         }
+    }
+}
+
+impl PlanState {
+    /// Forgets the file of the scene before.
+    pub fn forget_file(&mut self) {
+        (self.path, self.own_file) = (String::new(), None);
     }
 }
 
