@@ -148,7 +148,7 @@ fn print_haptic(recorded: &HapticFlight) {
         );
     }
     println!(
-        "         peak force {:.3} N, {missed} deadlines missed, latest wake-up {:.1} us, longest tick {:.1} us, {} orders",
+        "         peak force {:.3} N, {missed} deadlines missed, latest wake-up {:.1} µs, longest tick {:.1} µs, {} orders",
         peak_n.fold(0.0, f64::max),
         longest(|r| r.wake_latency_ns),
         longest(|r| r.work_ns),

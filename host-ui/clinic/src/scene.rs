@@ -34,14 +34,14 @@ pub fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
         v.cells.len() as f64 / f64::from(1 << 20)
     );
     println!(
-        "  tissue: {} elements, {:.2} cm3",
+        "  tissue: {} elements, {:.2} cc",
         v.tissue_elements(),
         v.tissue_elements() as f64 * (h_mm / 10.0).powi(3)
     );
     for t in &v.structures {
         let cells = v.cells.iter().filter(|&&c| c == t.label).count();
         println!(
-            "  {} (label {}, {:?}): {cells} elements, {:.2} cm3, {} kPa{}",
+            "  {} (label {}, {:?}): {cells} elements, {:.2} cc, {} kPa{}",
             printable(&t.name),
             t.label,
             t.role,
