@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use stylet_base::write_whole;
 use stylet_host::core_args::CoreArgs;
 use stylet_host::link::SceneModel;
-use stylet_imaging::fluoroscopy::{CArm, Exposure, Fluoroscope};
+use stylet_imaging::fluoroscopy::{Attenuation, CArm, Exposure, Fluoroscope};
 use stylet_imaging::ultrasound::{Plane, Pose, Probe, Scanner, Settings, View};
 use stylet_imaging::{Body, Gpu, Metal};
 use stylet_implant::plan::{Hole, Template};
@@ -158,7 +158,9 @@ impl PictureArgs {
             cranial: self.cranial.to_radians(),
             ..CArm::about(middle, header.patient().rotation().transpose())
         };
-        let greys = Fluoroscope::new(gpu).shoot(&arm, body, field, metal).greys();
+        let greys = Fluoroscope::new(gpu)
+            .shoot(&arm, &Attenuation::smooth(body), field, metal)
+            .greys();
         println!("air kerma: {:.0} uGy", Exposure::default().air_kerma_gy(&arm) * 1e6);
         greys.into_iter().map(|g| [g, g, g, 255]).collect()
     }

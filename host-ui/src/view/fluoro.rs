@@ -15,10 +15,10 @@ use eframe::wgpu;
 use egui::emath::GuiRounding as _;
 use egui::{Rect, Sense, Vec2};
 use nalgebra::Vector3;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use stylet_base::job::{Job, JobUpdate};
-use stylet_imaging::fluoroscopy::{CArm, DoseCounter, Exposure, Fluoroscope};
+use stylet_imaging::fluoroscopy::{Attenuation, CArm, DoseCounter, Exposure, Fluoroscope};
 use stylet_imaging::{Body, Gpu};
 use stylet_shm_schema::{SceneHeader, SceneId};
 use stylet_surfaces::field::Field;
@@ -43,7 +43,7 @@ pub(super) struct FluoroView {
     tube: Option<Arc<Fluoroscope>>,
     /// Pulse that is being computed: the arm, and the greys of its picture.
     pulse: Option<Job<(CArm, Vec<u8>)>>,
-    case: Option<(Case, Arc<Body>)>,
+    case: Option<(Case, Arc<Patient>)>,
     held: Option<Held>,
     pub dose: DoseCounter,
     angles: Angles,
@@ -64,6 +64,12 @@ impl Angles {
         self.orbital = (self.orbital + orbital).clamp(-ORBITAL_DEG, ORBITAL_DEG);
         self.cranial = (self.cranial + cranial).clamp(-CRANIAL_DEG, CRANIAL_DEG);
     }
+}
+
+/// Body of a case. Its attenuation is made by the thread of the first pulse.
+struct Patient {
+    body: Body,
+    attenuation: OnceLock<Attenuation>,
 }
 
 /// Graphics resources of the screen.
@@ -131,7 +137,12 @@ impl FluoroView {
         if self.case.as_ref().is_none_or(|(before, _)| *before != case) {
             self.begin_case();
             self.release();
-            self.case = Body::of_scene(&model.header, &model.labels).map(|body| (case, Arc::new(body)));
+            let patient = |body| Patient {
+                body,
+                attenuation: OnceLock::new(),
+            };
+            let body = Body::of_scene(&model.header, &model.labels);
+            self.case = body.map(|body| (case, Arc::new(patient(body))));
         }
         let arm = self.arm(&model.header);
         self.take_pulse();
@@ -175,15 +186,16 @@ impl FluoroView {
         if self.pulse.is_some() || !self.held.as_ref().is_none_or(is_due) {
             return;
         }
-        let (Some(screen), Some((_, body))) = (&self.screen, &self.case) else {
+        let (Some(screen), Some((_, patient))) = (&self.screen, &self.case) else {
             return;
         };
-        let (body, field, metal) = (Arc::clone(body), field.clone(), shown.metal());
+        let (patient, field, metal) = (Arc::clone(patient), field.clone(), shown.metal());
         let new = || Arc::new(Fluoroscope::new(screen.gpu.clone()));
         let tube = Arc::clone(self.tube.get_or_insert_with(new));
         self.pulse = Some(Job::begin("fluoroscopy", move |sender, _| {
+            let body = patient.attenuation.get_or_init(|| Attenuation::smooth(&patient.body));
             // The window may have closed, so the picture may have no receiver.
-            let _ = sender.send((arm, tube.shoot(&arm, &body, &field, &metal).greys()));
+            let _ = sender.send((arm, tube.shoot(&arm, body, &field, &metal).greys()));
         }));
         self.dose.count(&exposure, &arm);
         if let Some(held) = &mut self.held {

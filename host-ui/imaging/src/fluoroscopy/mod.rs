@@ -1,13 +1,15 @@
 //! Radiographs of the deformed body, by a C-arm that turns about it.
 
 mod arm;
+mod attenuation;
 mod exposure;
 mod metal;
 
 pub use arm::CArm;
+pub use attenuation::Attenuation;
 pub use exposure::{DoseCounter, Exposure};
 
-use crate::body::{Body, Metal};
+use crate::body::Metal;
 use crate::gpu::{Gpu, READ, SAMPLER, UNIFORM, VOLUME, WRITE};
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
@@ -70,15 +72,10 @@ impl Fluoroscope {
     }
 
     /// Takes one picture.
-    pub fn shoot(&self, arm: &CArm, body: &Body, field: &Field, metal: &Metal) -> Radiograph {
+    pub fn shoot(&self, arm: &CArm, body: &Attenuation, field: &Field, metal: &Metal) -> Radiograph {
         let gpu = &self.gpu;
         let storage = wgpu::BufferUsages::STORAGE;
-        let per_m: Vec<f32> = body
-            .cells
-            .iter()
-            .map(|&label| body.tissues[usize::from(label)].xray_per_m)
-            .collect();
-        let cells = gpu.filled(bytemuck::cast_slice(&per_m), storage);
+        let cells = gpu.filled(bytemuck::cast_slice(&body.per_m), storage);
         let metal = gpu.filled(bytemuck::cast_slice(&metal::losses(arm, metal)), storage);
         let mut texels = Vec::new();
         field.texels(&mut texels);
@@ -115,7 +112,7 @@ impl Fluoroscope {
     }
 }
 
-fn shot(arm: &CArm, body: &Body, field: &Field) -> Shot {
+fn shot(arm: &CArm, body: &Attenuation, field: &Field) -> Shot {
     let four = |v: Vector3<f64>, w: f64| [v.x, v.y, v.z, w].map(|c| c as f32);
     let [right, up] = arm.right_up();
     let info = &field.info;
@@ -124,13 +121,13 @@ fn shot(arm: &CArm, body: &Body, field: &Field) -> Shot {
         .iter()
         .flatten()
         .fold(0.0, |most: f32, c| most.max(c.abs()));
-    let dims = Vector3::from(body.grid.dims).map(f64::from);
+    let dims = Vector3::from(body.dims).map(f64::from);
     Shot([
         four(arm.source_m(), f64::from(farthest_m)),
         four(arm.detector_m(), arm.pixel_m()),
         four(right, f64::from(arm.pixels[0])),
         four(up, f64::from(arm.pixels[1])),
-        four(body.corner_m(), body.grid.spacing_m),
+        four(body.corner_m, body.spacing_m),
         four(dims, PIECE_M),
         four(Vector3::from(info.origin_m).add_scalar(-0.5 * info.spacing_m), 0.0),
         four(Vector3::from(info.dims).map(|d| f64::from(d) * info.spacing_m), 0.0),

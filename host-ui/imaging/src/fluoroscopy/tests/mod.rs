@@ -2,7 +2,7 @@
 
 use super::metal::{CORE_LENGTH_M, CORE_RADIUS_M, WALL_M, WELD_M};
 use super::*;
-use crate::body::{NEEDLE_RADIUS_M, SEED_LENGTH_M, SEED_RADIUS_M};
+use crate::body::{Body, NEEDLE_RADIUS_M, SEED_LENGTH_M, SEED_RADIUS_M};
 use crate::xray::{BONE_PER_M, SILVER_PER_M, SOFT_PER_M, STEEL_PER_M, TITANIUM_PER_M};
 use crate::{Needle, Seed, Tissue};
 use nalgebra::{Matrix3, Vector2};
@@ -130,7 +130,7 @@ fn the_body_at_rest_matches_siddon() {
     let still = field(|_| Vector3::zeros());
     for (orbital, cranial) in [(0.0, 0.0), (30.0, 0.0), (-90.0, 0.0), (20.0, -25.0)] {
         let arm = arm(orbital, cranial);
-        let shown = scope.shoot(&arm, &body, &still, &Metal::default());
+        let shown = scope.shoot(&arm, &Attenuation::of_cells(&body), &still, &Metal::default());
         let [worst, rms] = compare(&shown, &arm, |source, end| siddon(&body, source, end));
         println!(
             "{orbital} {cranial}: worst {:.4} %, rms {:.4} %",
@@ -171,7 +171,7 @@ fn the_deformed_body_matches_fine_steps() {
     });
     for (orbital, cranial) in [(0.0, 0.0), (55.0, 10.0)] {
         let arm = arm(orbital, cranial);
-        let shown = scope.shoot(&arm, &body, &pushed, &Metal::default());
+        let shown = scope.shoot(&arm, &Attenuation::of_cells(&body), &pushed, &Metal::default());
         let [worst, rms] = compare(&shown, &arm, |source, end| {
             const STEP_M: f64 = 0.05e-3;
             let along = (end - source).normalize();
@@ -283,8 +283,8 @@ fn seeds_are_projected_to_a_pixel() {
                 }],
                 ..Metal::default()
             };
-            let clear = scope.shoot(&arm, &body, &still, &Metal::default()).clone();
-            let dark = scope.shoot(&arm, &body, &still, &metal);
+            let clear = scope.shoot(&arm, &Attenuation::of_cells(&body), &still, &Metal::default()).clone();
+            let dark = scope.shoot(&arm, &Attenuation::of_cells(&body), &still, &metal);
             let (mut sum, mut whole) = (Vector2::zeros(), 0.0);
             for (n, (before, after)) in clear.transmission.iter().zip(&dark.transmission).enumerate() {
                 let weight = f64::from(before.ln() - after.ln());
@@ -375,7 +375,7 @@ fn pulses_a_second() {
     let mut times: Vec<f64> = (0..20)
         .map(|_| {
             let start = std::time::Instant::now();
-            scope.shoot(&arm, &body, &moved, &metal).greys();
+            scope.shoot(&arm, &Attenuation::of_cells(&body), &moved, &metal).greys();
             start.elapsed().as_secs_f64() * 1e3
         })
         .collect();
