@@ -89,7 +89,8 @@ fn settings_ui(ui: &mut egui::Ui, settings: &mut Settings) {
         .max_decimals(0)
         .update_while_editing(false)
         .suffix(" %");
-    if ui.add(drag).labelled_by(label.id).changed() {
+    let drag = ui.add(drag).labelled_by(label.id);
+    if drag.on_hover_text("100 % follows the size of the window").changed() {
         settings.scale = percent / 100.0;
     }
     let label = ui
@@ -158,6 +159,7 @@ fn second_ui(ui: &mut egui::Ui, shown: &Shown) {
 /// Draws whether the tissue is prepared for the needle at its place, with finite elements.
 fn line_ui(ui: &mut egui::Ui, shown: &Shown) {
     let tokens = theme::of(ui);
+    let preparing = format!("preparing line {}", shown.line_wait.words());
     let (word, color, hint) = match shown.needle_line() {
         None => return,
         Some(NeedleLine::Ready) => (
@@ -166,9 +168,9 @@ fn line_ui(ui: &mut egui::Ui, shown: &Shown) {
             "The tissue is prepared for the needle where it is: friction, membranes and tissue are solved together.",
         ),
         Some(NeedleLine::Preparing) => (
-            "preparing line",
+            preparing.trim_end(),
             tokens.warn,
-            "rt-core solves for the tissue along the needle, some seconds for each place. Hold the needle before its \
+            "rt-core solves for the tissue along the needle: seconds waited, of those that the last line took. Hold the needle before its \
              entry until this says LINE READY.",
         ),
         Some(NeedleLine::Missing) => (

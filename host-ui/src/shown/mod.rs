@@ -11,7 +11,7 @@ use crate::dose_worker::DoseResult;
 pub use crate::planner::Note;
 use crate::planner::Planning;
 pub use bend::Bend;
-pub use line::NeedleLine;
+pub use line::{LineWait, NeedleLine};
 use nalgebra::Vector3;
 pub use parts::{FrameCost, LoadState, TipOnPath, Watched};
 pub use second::{SecondHand, Stepper};
@@ -59,6 +59,7 @@ pub struct Shown {
     /// Needles that stay in while another moves.
     pub left: Vec<LeftNeedlePose>,
     pub snapshot_residual: Option<f64>,
+    pub line_wait: LineWait,
     pub invalid_dropped: u64,
     /// Step of the scripted procedure during and after its run.
     pub running: bool,
@@ -140,6 +141,7 @@ impl Shown {
         }
         self.take_removed(seeds_before, link);
         self.take_given_up(link);
+        self.take_line_wait();
     }
 
     /// Returns the drawn place of a seed, which follows the body.
