@@ -27,4 +27,5 @@ mod theme;
 pub mod view;
 mod words;
 
+pub use settings::text_scale;
 pub use theme::colors_of_lines;

@@ -7,6 +7,10 @@ use serde::{Deserialize, Serialize};
 const KEY: &str = "stylet.settings";
 /// Smallest and largest scale of text and widgets.
 pub const SCALES: [f32; 2] = [0.8, 2.0];
+/// Points of the window in which a scale of 1 is the size of text.
+const MADE_FOR: [f32; 2] = [1280.0, 800.0];
+/// Change of the scale by a key.
+const STEP: f32 = 0.1;
 /// Range of the air kerma strength of a seed (U).
 pub const STRENGTHS_U: [f64; 2] = [0.05, 5.0];
 
@@ -53,6 +57,7 @@ impl Layout {
 #[serde(default)]
 pub struct Settings {
     pub theme: ThemeChoice,
+    /// Scale of text, relative to that of the window's size.
     pub scale: f32,
     pub layout: Layout,
     /// Recent files, the newest first.
@@ -105,13 +110,43 @@ impl Settings {
         scene.map_or("", |one| &one.path)
     }
 
-    pub fn apply(&self, ctx: &egui::Context) {
+    /// Changes the scale by the usual keys.
+    pub fn take_keys(&mut self, ctx: &egui::Context) {
+        use egui::gui_zoom::kb_shortcuts::{ZOOM_IN, ZOOM_IN_SECONDARY, ZOOM_OUT, ZOOM_RESET};
+        let pressed = |shortcut: &egui::KeyboardShortcut| ctx.input_mut(|i| i.consume_shortcut(shortcut));
+        let changed = match () {
+            () if pressed(&ZOOM_RESET) => 1.0,
+            () if pressed(&ZOOM_IN) || pressed(&ZOOM_IN_SECONDARY) => self.scale + STEP,
+            () if pressed(&ZOOM_OUT) => self.scale - STEP,
+            () => return,
+        };
+        self.scale = ((changed / STEP).round() * STEP).clamp(SCALES[0], SCALES[1]);
+    }
+
+    /// Applies colours and the size of text, in a window that enlarges it by `fit`.
+    pub fn apply(&self, ctx: &egui::Context, fit: f32) {
         ctx.set_theme(match self.theme {
             ThemeChoice::Dark => egui::Theme::Dark,
             ThemeChoice::Light => egui::Theme::Light,
         });
-        ctx.set_zoom_factor(self.scale);
+        ctx.set_zoom_factor((self.scale * fit).clamp(SCALES[0], SCALES[1]));
     }
+}
+
+/// Returns how much the present window enlarges text.
+pub fn fit_of(ctx: &egui::Context) -> f32 {
+    // Without a screen, as in tests, the size does not follow the scale.
+    match ctx.input(|i| i.viewport().monitor_size) {
+        Some(_) => text_scale(ctx.content_rect().size() * ctx.zoom_factor()),
+        None => 1.0,
+    }
+}
+
+/// Returns how much a window of this size in points enlarges text: in eighths, so that text keeps
+/// its size while an edge of the window moves a little.
+pub fn text_scale(size: egui::Vec2) -> f32 {
+    let times = (size.x / MADE_FOR[0]).min(size.y / MADE_FOR[1]);
+    ((times * 8.0).floor() / 8.0).clamp(1.0, SCALES[1])
 }
 
 #[cfg(test)]
@@ -137,6 +172,21 @@ mod tests {
         }
 
         fn flush(&mut self) {}
+    }
+
+    #[test]
+    fn larger_windows_have_larger_text_up_to_twice_its_size() {
+        for (size, times) in [
+            ([960.0, 600.0], 1.0),
+            ([1280.0, 720.0], 1.0),
+            ([1366.0, 768.0], 1.0),
+            ([1920.0, 1010.0], 1.25),
+            ([1920.0, 1080.0], 1.25),
+            ([3840.0, 2160.0], 2.0),
+            ([3840.0, 800.0], 1.0),
+        ] {
+            assert_eq!(text_scale(size.into()), times, "{size:?}");
+        }
     }
 
     #[test]

@@ -40,6 +40,8 @@ pub fn colors_of_lines() -> Vec<(String, Color32)> {
 
 /// Installs both themes at start; a setting selects the one shown.
 pub fn apply(ctx: &egui::Context) {
+    // The keys change a setting, because text also follows the size of the window.
+    ctx.options_mut(|options| options.zoom_with_keyboard = false);
     for (theme, tokens) in [(Theme::Dark, &DARK), (Theme::Light, &LIGHT)] {
         ctx.style_mut_of(theme, |style| {
             style.visuals = visuals(theme, tokens);

@@ -27,7 +27,7 @@ use crate::panel::workflow::WorkflowState;
 use crate::picture::Pictures;
 use crate::planner::Planner;
 use crate::redraw::Redraw;
-use crate::settings::Settings;
+use crate::settings::{self, Settings};
 use crate::shown::{FrameCost, Note, Shown};
 use crate::view::middle::Middle;
 use crate::{cpu_time, keyboard, theme};
@@ -106,8 +106,8 @@ pub struct App {
     dose: DoseWorker,
     pictures: Pictures,
     settings: Settings,
-    /// Settings when they were last applied.
-    applied: Option<Settings>,
+    /// Settings when they were last applied, and how much the window enlarged text.
+    applied: Option<(Settings, f32)>,
     history: History,
     /// Procedure as any host receives it.
     heard: ReceivedProcedure,
@@ -295,13 +295,13 @@ impl App {
         self.controllers = controllers;
     }
 
-    /// Applies the settings that changed since the last frame, here or by the keys for text size.
+    /// Applies the settings and the size of the window that changed since the last frame.
     fn apply_settings(&mut self, ctx: &egui::Context) {
-        if self.applied.as_ref() != Some(&self.settings) {
-            self.settings.apply(ctx);
-            self.applied = Some(self.settings.clone());
-        } else {
-            self.settings.scale = ctx.zoom_factor();
+        self.settings.take_keys(ctx);
+        let fit = settings::fit_of(ctx);
+        if self.applied.as_ref().is_none_or(|(of, before)| *of != self.settings || *before != fit) {
+            self.settings.apply(ctx, fit);
+            self.applied = Some((self.settings.clone(), fit));
         }
     }
 

@@ -226,6 +226,14 @@ impl Driven {
     }
 }
 
+/// Gives the window another size in pixels, with text of the size that follows from it.
+pub fn resize(window: &mut Harness<'_, App>, size: [f32; 2]) {
+    let fit = host_ui::text_scale(size.into());
+    window.ctx.set_zoom_factor(fit);
+    window.run_steps(1);
+    window.set_size(egui::Vec2::from(size) / fit);
+}
+
 /// Returns the options of a window on a core, or without one, that no gamepad moves.
 pub fn options_of(instance: Instance) -> Options {
     Options {
@@ -241,8 +249,10 @@ pub fn options_of(instance: Instance) -> Options {
 /// Returns the window on a core that runs.
 pub fn window_on(instance: &Instance, size: [f32; 2]) -> Harness<'static, App> {
     let options = options_of(instance.clone());
+    let fit = host_ui::text_scale(size.into());
     let window = Harness::builder()
-        .with_size(size)
+        .with_size(egui::Vec2::from(size) / fit)
+        .with_pixels_per_point(fit)
         .wgpu()
         .build_eframe(|cc| App::new(cc, options));
     // Steps without a picture draw nothing.

@@ -1,7 +1,7 @@
 //! The main states of the window in both themes and sizes: nothing clipped, nothing overlapping,
 //! and equal to the kept pictures.
 
-use crate::driven::{Driven, assert_drawn_by_changes, is_at_rest, keep_for_docs, misplaced};
+use crate::driven::{Driven, assert_drawn_by_changes, is_at_rest, keep_for_docs, misplaced, resize};
 use egui::Key;
 use egui_kittest::kittest::{NodeT, Queryable};
 use host_ui::app::App;
@@ -158,7 +158,7 @@ fn the_whole_procedure_by_one_key_ends_in_a_debrief() {
     for _ in 0..4 {
         driven.press(Key::V);
     }
-    driven.window.set_size(LARGE.into());
+    resize(&mut driven.window, LARGE);
     assert_in_place(&mut driven, "debrief, light, large");
     driven.picture("debrief-light-large");
     driven.compare_live("debrief_light_large", DEBRIEF_PIXELS);

@@ -37,9 +37,11 @@ fn window(instance: &str) -> Window {
 fn window_of(instance: &str, size: [f32; 2]) -> Window {
     let alone = Alone(Instance::new(instance).expect("a valid name"));
     let options = options_of(alone.0.clone());
+    let fit = host_ui::text_scale(size.into());
     Window {
         harness: Harness::builder()
-            .with_size(size)
+            .with_size(egui::Vec2::from(size) / fit)
+            .with_pixels_per_point(fit)
             .wgpu()
             .build_eframe(|cc| App::new(cc, options)),
         _alone: alone,
