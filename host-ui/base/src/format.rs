@@ -7,7 +7,13 @@ pub fn utc_now() -> String {
     jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ").to_string()
 }
 
-/// Converts a time from [`utc_now`] to local time for display; `None` for any other text.
+/// Returns the present local time for display.
+pub fn local_now() -> String {
+    local_time(&utc_now()).unwrap_or_default()
+}
+
+/// Converts a time from [`utc_now`] to local time with its zone for display; `None` for any other
+/// text.
 pub fn local_time(utc: &str) -> Option<String> {
     time_in(utc, jiff::tz::TimeZone::system())
 }
@@ -15,7 +21,7 @@ pub fn local_time(utc: &str) -> Option<String> {
 fn time_in(utc: &str, zone: jiff::tz::TimeZone) -> Option<String> {
     let civil = jiff::civil::DateTime::strptime("%Y%m%dT%H%M%SZ", utc).ok()?;
     let there = civil.to_zoned(jiff::tz::TimeZone::UTC).ok()?.with_time_zone(zone);
-    Some(there.strftime("%-d %b %Y, %H:%M").to_string())
+    Some(there.strftime("%-d %b %Y, %H:%M %Z").to_string())
 }
 
 /// Converts metres to millimetres.
@@ -119,7 +125,7 @@ mod tests {
         let east = jiff::tz::TimeZone::fixed(jiff::tz::offset(2));
         assert_eq!(
             time_in("20261101T230512Z", east.clone()).as_deref(),
-            Some("2 Nov 2026, 01:05")
+            Some("2 Nov 2026, 01:05 +02")
         );
         assert!(time_in(&utc_now(), east.clone()).is_some());
         for other in ["", "monday", "20261301T090000Z", "2026-11-01"] {

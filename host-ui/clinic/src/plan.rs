@@ -8,11 +8,10 @@ use std::path::{Path, PathBuf};
 use stylet_anatomy::PatientFrame;
 use stylet_base::progress_bar::progress_bar;
 use stylet_base::write_whole;
-use stylet_dose::criteria::DoseStructure;
 use stylet_dose::decay::Interval;
 use stylet_dose::perturb::Errors;
 use stylet_dose::report::Judge;
-use stylet_dose::{DoseKernel, Dvh, Source};
+use stylet_dose::{DoseKernel, Source};
 use stylet_files::dicom::plan::Date;
 use stylet_files::dicom::{Identity, Shared};
 use stylet_files::together;
@@ -27,7 +26,6 @@ use stylet_implant::provenance;
 use stylet_implant::readers::{Mapped, SeedDefaults, SeedFile, read_source};
 use stylet_population as population;
 
-const DOSE_PITCH_M: f64 = 1e-3;
 const POINTS: usize = 100_000;
 
 const HELP: &str = "\
@@ -279,7 +277,7 @@ fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result
     let seeds = plan.seeds();
     let strengths = seeds.iter().map(|s| s.strength_u);
     let total: f64 = strengths.clone().sum();
-    let structures = anatomy.structures(DOSE_PITCH_M);
+    let structures = anatomy.structures();
     let judge = Judge::new(
         structures,
         Some(&anatomy.target.name),
@@ -289,13 +287,7 @@ fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result
         POINTS,
     )?;
     let verdict = judge.judge(kernel, &seeds);
-    // The first structure is the target.
-    let named = judge.names().zip(&verdict.dvhs).enumerate();
-    let of_structure = |(n, (name, dvh)): (usize, (&str, &Dvh))| {
-        let figures = DoseStructure::of(name, n == 0).map(|s| s.figures(dvh, plan.prescription_gy));
-        figures.unwrap_or_default()
-    };
-    let broken = named.flat_map(of_structure).filter_map(|f| f.broken()).collect();
+    let broken = judge.figures(&verdict).iter().filter_map(|f| f.broken()).collect();
     let text = format!(
         "{} needles, {} seeds, {total:.2} U in all ({:.3} to {:.3} U a seed)\n{}",
         plan.needles.len(),

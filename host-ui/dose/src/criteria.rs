@@ -23,21 +23,52 @@ impl Figure {
     /// none.
     pub fn broken(&self) -> Option<String> {
         let limit = self.limit.filter(|limit| !limit.is_met(self.value))?;
+        let (structure, metric) = (&self.structure, self.metric);
+        Some(format!(
+            "{structure} {metric} is {}: limit {limit} not met",
+            self.shown()
+        ))
+    }
+
+    /// Returns the value with its unit.
+    pub fn shown(&self) -> String {
         let unit = match self.metric.unit() {
             "gy" => "Gy",
             _ => "%",
         };
-        let (side, value) = match limit {
-            Limit::AtLeast(value) => ("below", value),
-            Limit::AtMost(value) => ("above", value),
-        };
-        let (structure, metric) = (&self.structure, self.metric);
-        Some(format!(
-            "{structure} {metric} is {:.1} {unit}, {side} {value:.1} {unit} by {:.1}",
-            self.value,
-            (self.value - value).abs()
-        ))
+        format!("{} {unit}", shown(self.value, self.limit, 1))
     }
+}
+
+/// Formats a value, with more decimals than asked where only they show on which side of its limit
+/// it is.
+pub fn shown(value: f64, limit: Option<Limit>, decimals: usize) -> String {
+    let text = |decimals: usize| format!("{value:.decimals$}");
+    let agrees = |text: &String| {
+        limit.is_none_or(|limit| {
+            text.parse::<f64>()
+                .is_ok_and(|shown| limit.is_met(shown) == limit.is_met(value))
+        })
+    };
+    let longer = (decimals..decimals + 4).map(text);
+    longer.into_iter().find(agrees).unwrap_or_else(|| value.to_string())
+}
+
+/// Returns the figures of all structures, the first of each role.
+pub fn figures<'a>(
+    structures: impl IntoIterator<Item = (&'a str, &'a Dvh)>,
+    target: usize,
+    prescription_gy: f64,
+) -> Vec<Figure> {
+    let mut known = Vec::new();
+    let mut all = Vec::new();
+    for (n, (name, dvh)) in structures.into_iter().enumerate() {
+        if let Some(role) = DoseStructure::of(name, n == target).filter(|role| !known.contains(role)) {
+            known.push(role);
+            all.extend(role.figures(dvh, prescription_gy));
+        }
+    }
+    all
 }
 
 /// Limit of a measure, in its unit.
@@ -56,6 +87,22 @@ impl Limit {
             Self::AtLeast(limit) => value >= limit,
             Self::AtMost(limit) => value <= limit,
         }
+    }
+
+    /// Returns in words whether a value meets the limit.
+    pub fn verdict(self, value: f64) -> &'static str {
+        if self.is_met(value) { "met" } else { "not met" }
+    }
+}
+
+impl std::fmt::Display for Limit {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (sign, Self::AtLeast(limit) | Self::AtMost(limit)) = match self {
+            Self::AtLeast(_) => ("≥", self),
+            Self::AtMost(_) => ("≤", self),
+        };
+        // A product such as 1.3 times 115 has digits beyond those of a limit.
+        write!(f, "{sign} {}", (limit * 100.0).round() / 100.0)
     }
 }
 
@@ -91,7 +138,7 @@ impl DoseStructure {
     }
 
     /// Returns the measures of the structure, with their limits.
-    pub(crate) fn metrics(self, prescription_gy: f64) -> Vec<(Metric, Option<Limit>)> {
+    pub fn metrics(self, prescription_gy: f64) -> Vec<(Metric, Option<Limit>)> {
         let dose = |share: f64| Metric::DoseToShare(share);
         let volume = |share: f64| Metric::VolumeAtShare(share);
         match self {
@@ -137,12 +184,36 @@ mod tests {
         assert_eq!(
             broken,
             [
-                "urethra D10 is 291.0 Gy, above 217.5 Gy by 73.5",
-                "urethra D30 is 291.0 Gy, above 188.5 Gy by 102.5"
+                "urethra D10 is 291.0 Gy: limit ≤ 217.5 not met",
+                "urethra D30 is 291.0 Gy: limit ≤ 188.5 not met"
             ]
         );
         let dvh = Dvh::new(&[145.0; 10], &[1e-7; 10]).unwrap();
         let target = DoseStructure::Target.figures(&dvh, 145.0);
         assert!(target.iter().all(|f| f.broken().is_none()) && target.len() == 3);
+    }
+
+    /// Guards against "218.0 Gy, above 218".
+    #[test]
+    fn a_value_is_never_shown_on_the_other_side_of_its_limit() {
+        let (most, least) = (Limit::AtMost(217.5), Limit::AtLeast(145.0));
+        for (value, limit, text, verdict) in [
+            (217.5, most, "217.5", "met"),
+            (217.52, most, "217.52", "not met"),
+            (217.500_000_1, most, "217.5000001", "not met"),
+            (218.0, most, "218.0", "not met"),
+            (144.96, least, "144.96", "not met"),
+            (145.04, least, "145.0", "met"),
+        ] {
+            assert_eq!(
+                (shown(value, Some(limit), 1).as_str(), limit.verdict(value)),
+                (text, verdict)
+            );
+        }
+        assert_eq!(shown(217.52, None, 1), "217.5");
+        assert_eq!(
+            [Limit::AtMost(1.3 * 115.0), least].map(|l| l.to_string()),
+            ["≤ 149.5", "≥ 145"]
+        );
     }
 }

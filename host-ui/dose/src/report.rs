@@ -1,6 +1,7 @@
 //! Evaluation of a plan: measures of each structure, homogeneity and conformity of the target.
 
 use super::Dvh;
+use super::criteria::{Figure, figures};
 use super::criterion::Criterion;
 use super::edema::Swelling;
 use super::error::DoseError;
@@ -181,6 +182,11 @@ impl Judge {
     pub fn criteria(&self) -> Vec<Criterion> {
         let of = |(i, s): (usize, &Judged)| Criterion::of_structure(&s.name, i == self.target, self.prescription_gy);
         self.structures.iter().enumerate().flat_map(of).collect()
+    }
+
+    /// Returns the figures that have limits, or are shown with them.
+    pub fn figures(&self, verdict: &Verdict) -> Vec<Figure> {
+        figures(self.names().zip(&verdict.dvhs), self.target, self.prescription_gy)
     }
 
     /// Returns the name of the target.

@@ -13,4 +13,5 @@ pub mod readers;
 pub mod received;
 pub mod registration;
 pub mod score;
+pub mod slice;
 pub mod workflow;

@@ -3,7 +3,7 @@
 
 use crate::pairing;
 use crate::plan::{Hole, Template};
-use crate::score::{SeedPair, Trace};
+use crate::score::{SeedPair, Trace, seed_of};
 use nalgebra::Vector3;
 use stylet_dose::Seed;
 use stylet_host::link::Link;
@@ -173,22 +173,26 @@ impl ReceivedProcedure {
         self.needles.iter().enumerate().flat_map(of_needle).collect()
     }
 
-    /// Returns the input of a score: the seeds in the tissue, each with its planned one, and the
-    /// missing ones.
-    pub fn pairs(&self, strength_u: f64) -> (Vec<SeedPair>, Vec<Seed>) {
+    /// Returns the input of a score: the seeds in the tissue, each with its planned one, the missing
+    /// ones, and those of the received needles that have no planned one.
+    pub fn pairs(&self, strength_u: f64) -> (Vec<SeedPair>, Vec<Seed>, Vec<Seed>) {
         let template = self.scene.as_ref().map(Template::before);
         let hole = |planned_m, direction| template.and_then(|t| hole_of(&t, planned_m, direction));
         let (mut pairs, mut lost) = (Vec::new(), Vec::new());
+        let mut has_plan = vec![false; self.seeds.len()];
         for heard in self.planned(strength_u) {
             let (planned, direction) = (heard.planned, heard.planned.axis.unwrap_or_default());
             let Some(pose) = heard.placed.and_then(|place| self.seeds.get(place)) else {
                 lost.push(planned);
                 continue;
             };
+            heard.placed.into_iter().for_each(|place| has_plan[place] = true);
             let hole = hole(planned.position_m, direction);
             pairs.push(SeedPair::new((heard.needle, hole), planned, pose));
         }
-        (pairs, lost)
+        let others = (self.seeds_before()..self.seeds.len()).filter(|&n| !has_plan[n]);
+        let unplanned = others.map(|n| seed_of(&self.seeds[n], strength_u)).collect();
+        (pairs, lost, unplanned)
     }
 
     /// Returns whether every planned seed lies in the tissue, including those of the plan's last

@@ -5,6 +5,9 @@ use nalgebra::Vector3;
 use stylet_implant::plan::{SEED_LENGTH_M, TOUCHING_M};
 use stylet_insertions::{Insertion, Motion, Seed, Table};
 
+/// Fewest values with a histogram and with percentiles of their tails.
+pub const MANY: usize = 20;
+
 /// Sorted values of one quantity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Distribution {
@@ -50,6 +53,15 @@ impl Distribution {
         let (low, share) = (at as usize, at.fract());
         let high = self.values[(low + 1).min(last)];
         Some(self.values[low] + (high - self.values[low]) * share)
+    }
+
+    /// Returns the range for display: percentiles 5 and 95, or of few values all.
+    pub fn range(&self) -> [(&'static str, Option<f64>); 2] {
+        let ends = match self.values.len() < MANY {
+            true => [("smallest", 0.0), ("largest", 100.0)],
+            false => [("p5", 5.0), ("p95", 95.0)],
+        };
+        ends.map(|(name, percent)| (name, self.percentile(percent)))
     }
 }
 

@@ -2,13 +2,14 @@
 
 use crate::dose::{Covered, ImplantDose, Scored};
 use crate::error::PopulationError;
-use crate::figures::{Distribution, gaps_mm, influences, touching};
+use crate::figures::{Distribution, MANY, gaps_mm, influences, touching};
 use crate::picture;
 use crate::published::{PUBLISHED, Published, published_in};
 use crate::shards::Population;
 use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
-use stylet_base::format::printable;
+use stylet_base::format::{self, printable};
+use stylet_dose::criteria::Limit;
 use stylet_insertions::Insertion;
 use stylet_report::parts::{self, Column, cell, num};
 
@@ -90,7 +91,7 @@ fn cards(figures: &[Distribution]) -> Markup {
         let unit = d.unit.split(' ').next().unwrap_or_default();
         (
             html! { b { (value(d.percentile(50.0))) " " (unit) } },
-            html! { (d.name) ", median" br; "p5 " (value(d.percentile(5.0))) ", p95 " (value(d.percentile(95.0))) },
+            html! { (d.name) ", median" br; (range(d)) },
         )
     }))
 }
@@ -125,15 +126,16 @@ fn warnings(p: &Population, scored: &Scored) -> Markup {
 
 fn plot(d: &Distribution) -> Result<Markup, PopulationError> {
     let published: Vec<&Published> = published_in(d.name).collect();
-    let (svg, beyond) = picture::histogram(d, &published)?;
+    let (svg, beyond) = picture::distribution(d, &published)?;
     Ok(html! {
         figure {
             h3 { (d.name) }
             (PreEscaped(svg))
             figcaption {
                 (thousands(d.values.len())) " " (d.each) "s: mean " b { (value(d.mean())) } ", SD " (value(d.deviation())) ", median "
-                b { (value(d.percentile(50.0))) } ", p5 " (value(d.percentile(5.0))) ", p95 " (value(d.percentile(95.0)))
-                ", largest " (value(d.percentile(100.0))) " " (d.unit) "."
+                b { (value(d.percentile(50.0))) } ", " (range(d))
+                @if d.values.len() >= MANY { ", largest " (value(d.percentile(100.0))) }
+                " " (d.unit) "."
                 @if beyond > 0 { " The last bar includes " (beyond) " beyond it." }
                 @for (n, p) in published.iter().enumerate() {
                     br; span class="ref" { (n + 1) " published: " (p.value) " " (p.unit) } ", " (p.how) " (" (p.source) "; " (p.used.name()) ")"
@@ -141,6 +143,11 @@ fn plot(d: &Distribution) -> Result<Markup, PopulationError> {
             }
         }
     })
+}
+
+fn range(d: &Distribution) -> String {
+    let [low, high] = d.range().map(|(name, of)| format!("{name} {}", value(of)));
+    format!("{low}, {high}")
 }
 
 fn neighbours(rows: &[Insertion]) -> Markup {
@@ -181,12 +188,16 @@ fn dose(scored: &Scored) -> Markup {
     if scored.implants.is_empty() {
         return html! {};
     }
-    let count = scored.implants.len() as f64;
-    let reached = |percent: f64| {
-        let reach = scored.implants.iter().filter(|i| i.delivered.d90_percent >= percent);
-        format!("{:.1} %", 100.0 * reach.count() as f64 / count)
+    let met = |limit: Limit, of: fn(&Covered) -> f64| {
+        let all = scored.implants.iter().map(|i| of(&i.delivered));
+        format!(
+            "{} of {}",
+            all.filter(|v| limit.is_met(*v)).count(),
+            scored.implants.len()
+        )
     };
-    let row = |name: &str, of: fn(&Covered) -> f64| {
+    let row = |name: &str, limit: f64, of: fn(&Covered) -> f64| {
+        let limit = Limit::AtLeast(limit);
         let column = |of_implant: &dyn Fn(&ImplantDose) -> f64| {
             Distribution::new("", "%", "implant", scored.implants.iter().map(of_implant).collect())
         };
@@ -194,21 +205,19 @@ fn dose(scored: &Scored) -> Markup {
         let figures = [planned.mean(), delivered.mean(), delivered.deviation()];
         let percentiles = [5.0, 50.0, 95.0].map(|p| delivered.percentile(p));
         let values = figures.into_iter().chain(percentiles).map(|v| cell(value(v)));
-        std::iter::once(cell(name)).chain(values).collect()
+        let judged = [cell(limit.to_string()), cell(met(limit, of))];
+        std::iter::once(cell(name)).chain(values).chain(judged).collect()
     };
     let rows = [
-        row("D90, % of the prescription", |c| c.d90_percent),
-        row("V100, % of the target", |c| c.v100_percent),
+        row("D90, % of the prescription", 100.0, |c| c.d90_percent),
+        row("D90, % of the prescription", 90.0, |c| c.d90_percent),
+        row("V100, % of the target", 95.0, |c| c.v100_percent),
     ];
     html! {
         h2 { "Dose of the target" }
         p { "TG-43U1, as the plan has its seeds and as they came to rest; every needle began in a gland at rest, so that "
             "needles that only push or hold the gland are not part of it." }
-        (parts::numbers(&["", "planned, mean", "delivered, mean", "SD", "p5", "median", "p95"], &rows))
-        p {
-            "D90 is at least 90 % of the prescription in " b { (reached(90.0)) }
-            " of the implants, and at least 100 % in " b { (reached(100.0)) } "."
-        }
+        (parts::numbers(&["", "planned, mean", "delivered, mean", "SD", "p5", "median", "p95", "limit", "met by implants"], &rows))
     }
 }
 
@@ -267,7 +276,7 @@ fn made(p: &Population) -> Markup {
         h2 { "The study" }
         pre { (printable_lines(&about.definition)) }
         footer {
-            p { "Made by " (printable(&about.made_by)) ", page by host-ui " (env!("CARGO_PKG_VERSION")) ". "
+            p { "Made by " (printable(&about.made_by)) ", page by host-ui " (env!("CARGO_PKG_VERSION")) ", " (format::local_now()) ". "
                 (p.files.len()) " files; SHA-256 of the rows, independent of the shards: " code { (p.digest) } }
             p { "Query the same files: " code { "duckdb -c \"SELECT scene, avg(peak_force_n) FROM 'shard-*.parquet' GROUP BY scene\"" } }
             p { "Made by a simulator for research and training. Not a medical device." }

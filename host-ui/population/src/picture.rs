@@ -1,6 +1,6 @@
-//! A histogram as SVG, with published values as lines.
+//! A histogram as SVG, or the values themselves where they are few, with published values as lines.
 
-use crate::figures::Distribution;
+use crate::figures::{Distribution, MANY};
 use crate::published::Published;
 use plotters::prelude::*;
 use stylet_report::picture::{BLUE, Canvas, DrawError, Drawn, INK, ORANGE, axes, drawn, label};
@@ -25,7 +25,8 @@ struct Bars {
 impl Bars {
     fn of(d: &Distribution, published: &[&Published]) -> Self {
         let least = d.percentile(0.0).unwrap_or(0.0);
-        let most = d.percentile(LAST_PERCENTILE).unwrap_or(1.0);
+        let last = if d.values.len() < MANY { 100.0 } else { LAST_PERCENTILE };
+        let most = d.percentile(last).unwrap_or(1.0);
         // Published values widen the axis, not the bars.
         let drawn = |limit: f64, choose: fn(f64, f64) -> f64| published.iter().map(|p| p.value).fold(limit, choose);
         let wanted = ((d.values.len() as f64).sqrt() as usize).clamp(8, MOST_BINS);
@@ -66,25 +67,31 @@ fn round_width(width: f64) -> f64 {
     times.unwrap_or(10.0) * power
 }
 
-/// Returns the histogram; published values in orange, in the order of their numbers in the caption.
-pub fn histogram(d: &Distribution, published: &[&Published]) -> Result<(String, usize), DrawError> {
+/// Returns the picture; published values in orange, in the order of their numbers in the caption.
+pub fn distribution(d: &Distribution, published: &[&Published]) -> Result<(String, usize), DrawError> {
     let bars = Bars::of(d, published);
     let svg = drawn(SIZE, |root| draw(root, d, published, &bars))?;
-    Ok((svg, bars.beyond))
+    Ok((svg, if d.values.len() < MANY { 0 } else { bars.beyond }))
 }
 
 fn draw(root: &Canvas, d: &Distribution, published: &[&Published], bars: &Bars) -> Drawn {
     let [low, high] = bars.axis;
     let share = |count: usize| 100.0 * count as f64 / d.values.len() as f64;
-    let highest = bars.counts.iter().copied().map(share).fold(0.0, f64::max) * 1.18;
+    let is_few = d.values.len() < MANY;
+    let highest = match is_few {
+        true => d.values.len() as f64 + 1.0,
+        false => bars.counts.iter().copied().map(share).fold(0.0, f64::max) * 1.18,
+    };
     let mut chart = ChartBuilder::on(root)
         .margin(8)
         .margin_right(16)
         .x_label_area_size(44)
         .y_label_area_size(52)
         .build_cartesian_2d(low..high, 0.0..highest)?;
-    let digits = usize::from(high - low < 4.0);
-    let names = [&format!("{} ({})", d.name, d.unit), &format!("{}s (%)", d.each)];
+    // So many that neighbouring labels differ.
+    let digits = (-((high - low) / 8.0).log10()).ceil().clamp(0.0, 6.0) as usize;
+    let of_y = if is_few { "s, in order" } else { "s (%)" };
+    let names = [&format!("{} ({})", d.name, d.unit), &format!("{}{of_y}", d.each)];
     let of_x = |x: &f64| format!("{:.*}", digits, x + 0.0);
     axes(&mut chart, names.map(String::as_str), |mesh| {
         mesh.disable_x_mesh()
@@ -93,8 +100,13 @@ fn draw(root: &Canvas, d: &Distribution, published: &[&Published], bars: &Bars) 
             .x_label_formatter(&of_x)
             .y_label_formatter(&|y| format!("{y:.0}"));
     })?;
+    if is_few {
+        let places = d.values.iter().enumerate().map(|(n, &value)| (value, (n + 1) as f64));
+        chart.draw_series(places.map(|place| Circle::new(place, 4, BLUE.filled())))?;
+    }
     let gap = 0.04 * bars.width;
-    chart.draw_series(bars.counts.iter().enumerate().map(|(n, &count)| {
+    let counts: &[usize] = if is_few { &[] } else { &bars.counts };
+    chart.draw_series(counts.iter().enumerate().map(|(n, &count)| {
         let left = bars.from + n as f64 * bars.width;
         Rectangle::new(
             [(left + gap, 0.0), (left + bars.width - gap, share(count))],

@@ -15,8 +15,8 @@ use stylet_implant::intraoperative::Reviewed;
 use stylet_implant::plan::{Anatomy, Hole, ImplantPlan, exchange, file};
 use stylet_implant::provenance;
 use stylet_implant::received::ReceivedProcedure;
-use stylet_implant::score::{self, Implant, Motion, Score, SeedPair};
-use stylet_shm_schema::{Prescribed, SeedPose, TickRecord};
+use stylet_implant::score::{self, Implant, Motion, Score, SeedPair, seed_of};
+use stylet_shm_schema::{Prescribed, TickRecord};
 
 /// Folder that was written, or the reason why it could not be.
 pub(super) type Saved = Result<PathBuf, Failure>;
@@ -36,6 +36,7 @@ pub(super) struct Delivered {
     prescription_gy: f64,
     pairs: Vec<SeedPair>,
     lost: Vec<Seed>,
+    unplanned: Vec<Seed>,
     motion: Motion,
     records: Vec<TickRecord>,
     moments: Vec<Moment>,
@@ -131,32 +132,41 @@ impl App {
         (delivered.source, delivered.prescription_gy) = source_of(&implant.plan.source, implant.plan.prescription_gy)?;
         delivered.title = format!("Scene {}", delivered.scene.header.name.read());
         (delivered.pairs, delivered.lost) = (Vec::new(), Vec::new());
+        let seeds = &self.shown.seeds;
+        let mut has_plan = vec![false; seeds.len()];
         for (needle, row) in all_errors(&self.shown) {
             let Some((hole, planned, placed)) = self.pair(implant, needle, &row) else {
                 continue;
             };
             match placed {
-                Some(pose) => delivered.pairs.push(SeedPair::new((needle, hole), planned, &pose)),
+                Some(n) => {
+                    has_plan[n] = true;
+                    delivered.pairs.push(SeedPair::new((needle, hole), planned, &seeds[n]));
+                }
                 None => delivered.lost.push(planned),
             }
         }
+        let (strength_u, others) = (self.planned_as().strength_u, seeds.iter().zip(has_plan));
+        let others = others.filter(|(_, has_plan)| !has_plan);
+        delivered.unplanned = others.map(|(pose, _)| seed_of(pose, strength_u)).collect();
         (delivered.updates, delivered.plan) = (self.planner.reviewed().to_vec(), Some(implant.plan.clone()));
         Ok(delivered)
     }
 
-    /// Returns the hole of a planned seed, the seed, and the one that was dropped for it.
+    /// Returns the hole of a planned seed, the seed, and the number of the one that was dropped for
+    /// it.
     fn pair(
         &self,
         implant: &planner::Implant,
         needle: usize,
         row: &SeedError,
-    ) -> Option<(Option<Hole>, Seed, Option<SeedPose>)> {
+    ) -> Option<(Option<Hole>, Seed, Option<usize>)> {
         let shown = &self.shown;
         let of = implant.plan.needles.get(needle)?;
         let planned = of.dose_seeds().nth(row.planned)?;
         let own = shown.planning.progress.seeds_of(needle, shown.seeds.len());
-        let placed = row.placed.and_then(|n| shown.seeds[own].get(n));
-        Some((of.hole, planned, placed.copied()))
+        let placed = row.placed.map(|n| own.start + n).filter(|n| own.contains(n));
+        Some((of.hole, planned, placed))
     }
 }
 
@@ -179,7 +189,7 @@ impl Delivered {
     ) -> Result<Self, Failure> {
         let scene = link.scene().ok_or("there is no scene yet")?.clone();
         let (source, prescription_gy) = source_of(&planned.source.read(), planned.dose_gy)?;
-        let (pairs, lost) = heard.pairs(planned.strength_u);
+        let (pairs, lost, unplanned) = heard.pairs(planned.strength_u);
         let mut title = format!("Scene {}", scene.header.name.read());
         if let Some(name) = trainee {
             title = format!("{title}, {name}");
@@ -194,6 +204,7 @@ impl Delivered {
             prescription_gy,
             pairs,
             lost,
+            unplanned,
             motion: heard.trace().motion(),
             records: heard.trace().records().to_vec(),
             moments: heard.own_moments(),
@@ -226,6 +237,7 @@ fn write(delivered: &Delivered, folder: PathBuf) -> Result<PathBuf, Failure> {
         title: delivered.title.clone(),
         pairs: delivered.pairs.clone(),
         lost: delivered.lost.clone(),
+        unplanned: delivered.unplanned.clone(),
         anatomy: &anatomy,
         kernel: &kernel,
         source: format!("{} {}", delivered.source.nuclide, delivered.source.model),

@@ -2,15 +2,17 @@
 
 mod figures;
 
+use figures::Counted;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
-pub use stylet_dose::criteria::{Figure, Limit};
+pub use stylet_dose::criteria::Figure;
 use stylet_dose::decay::Interval;
 use stylet_dose::isodose::isodose;
 use stylet_dose::{DoseGrid, DoseKernel, Seed, Source};
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::ImplantPlan;
 use stylet_implant::plan::exchange::USUAL_SOURCE;
+use stylet_implant::score::seed_of;
 use stylet_shm_schema::{Prescribed, SceneId, SeedPose};
 use stylet_surfaces::mesh::{self, SurfaceVertex};
 
@@ -88,7 +90,7 @@ impl DoseRequest {
             },
             prescription_gy: (planned.dose_gy > 0.0).then_some(planned.dose_gy),
             body_moved_m: [0.0; 3],
-            seeds: poses.iter().map(|p| seed(p, planned.strength_u)).collect(),
+            seeds: poses.iter().map(|p| seed_of(p, planned.strength_u)).collect(),
         }
     }
 
@@ -243,14 +245,6 @@ impl DoseWorker {
     }
 }
 
-fn seed(pose: &SeedPose, strength_u: f64) -> Seed {
-    Seed {
-        position_m: pose.position_m,
-        axis: Some(pose.axis),
-        strength_u,
-    }
-}
-
 fn is_same(a: &[Seed], b: &[Seed]) -> bool {
     let near = |a: &Seed, b: &Seed| {
         let d2: f64 = (0..3).map(|i| (a.position_m[i] - b.position_m[i]).powi(2)).sum();
@@ -261,6 +255,7 @@ fn is_same(a: &[Seed], b: &[Seed]) -> bool {
 
 fn compute_all(work: &Receiver<DoseTask>, done: &Sender<DoseResult>) {
     let mut known: Option<(String, Source, DoseKernel)> = None;
+    let mut counted: Option<(SceneId, Counted)> = None;
     while let Ok(task) = work.recv() {
         let model = &task.request.source;
         if known.as_ref().is_none_or(|(name, _, _)| name != model) {
@@ -271,14 +266,20 @@ fn compute_all(work: &Receiver<DoseTask>, done: &Sender<DoseResult>) {
             let kernel = DoseKernel::new(&source, Interval::ALL);
             known = Some((model.clone(), source, kernel));
         }
-        let Some((_, source, kernel)) = &known else { return };
-        if done.send(compute(&task, source, kernel)).is_err() {
+        let scene = task.scene.header.id();
+        if counted.as_ref().is_none_or(|(of, _)| *of != scene) {
+            counted = Some((scene, Counted::of(&task.scene)));
+        }
+        let (Some((_, source, kernel)), Some((_, counted))) = (&known, &counted) else {
+            return;
+        };
+        if done.send(compute(&task, source, kernel, counted)).is_err() {
             return;
         }
     }
 }
 
-fn compute(task: &DoseTask, source: &Source, kernel: &DoseKernel) -> DoseResult {
+fn compute(task: &DoseTask, source: &Source, kernel: &DoseKernel, counted: &Counted) -> DoseResult {
     let seeds = &task.request.seeds;
     let usual_gy = source.prescription_gy.unwrap_or(USUAL_PRESCRIPTION_GY);
     let prescription_gy = task.request.prescription_gy.unwrap_or(usual_gy);
@@ -291,8 +292,7 @@ fn compute(task: &DoseTask, source: &Source, kernel: &DoseKernel) -> DoseResult 
         grid.add(kernel, seeds);
         shells.extend((0..LEVELS.len()).map(|level| shell(&grid, level, prescription_gy)));
     }
-    let dvhs = figures::dvhs(&task.scene, kernel, seeds);
-    let target = dvhs.first();
+    let (figures, target_dvh) = counted.figures(kernel, seeds, prescription_gy);
     DoseResult {
         number: task.number,
         of: task.request.of,
@@ -305,8 +305,8 @@ fn compute(task: &DoseTask, source: &Source, kernel: &DoseKernel) -> DoseResult 
         },
         prescription_gy,
         shells,
-        figures: figures::figures(&dvhs, prescription_gy),
-        target_dvh: target.map_or(Vec::new(), |(_, dvh)| figures::curve(dvh, prescription_gy)),
+        figures,
+        target_dvh,
     }
 }
 

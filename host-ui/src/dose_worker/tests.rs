@@ -3,6 +3,8 @@
 use super::*;
 use bytemuck::Zeroable;
 use std::time::{Duration, Instant};
+use stylet_dose::report::Judge;
+use stylet_implant::plan::Anatomy;
 use stylet_shm_schema::{SceneHeader, role};
 
 fn pose(z_m: f64) -> SeedPose {
@@ -28,7 +30,24 @@ fn scene() -> Arc<SceneModel> {
     (header.target_lower_m, header.target_upper_m) = ([0.0; 3], [0.04; 3]);
     header.structure_count = 1;
     header.structures[0].role = role::TARGET;
-    Arc::new(SceneModel::new(header, Vec::new(), Vec::new(), vec![1; 8000]))
+    (header.spacing_m, header.body_triangle_count) = (2e-3, 12);
+    // A box through the middles of the outermost elements.
+    let corner = |n: u32| [n & 1, n >> 1 & 1, n >> 2].map(|far| if far == 1 { 0.039 } else { 0.001 });
+    let faces = [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ];
+    let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    Arc::new(SceneModel::new(
+        header,
+        (0..8).map(corner).collect(),
+        triangles,
+        vec![1; 8000],
+    ))
 }
 
 fn wait(worker: &mut DoseWorker, scene: &Arc<SceneModel>, poses: &[SeedPose]) -> Arc<DoseResult> {
@@ -63,7 +82,7 @@ fn the_shell_of_a_seed_lies_where_the_formula_gives_that_dose() {
         let r = out.iter().map(|c| c * c).sum::<f64>().sqrt();
         let dose_at = |r_m: f64| {
             let place = [0, 1, 2].map(|a| poses[0].position_m[a] + out[a] / r * r_m);
-            kernel.exact_at_gy(&seed(&poses[0], 0.5), place)
+            kernel.exact_at_gy(&seed_of(&poses[0], 0.5), place)
         };
         let (nearer, farther) = (dose_at(r - SPACING_M), dose_at(r + SPACING_M));
         assert!(
@@ -73,6 +92,20 @@ fn the_shell_of_a_seed_lies_where_the_formula_gives_that_dose() {
     }
     assert_eq!(picture.figures.len(), 3, "{:?}", picture.figures);
     assert!(picture.figures.iter().all(|f| f.structure == "target"));
+}
+
+/// Guards against a D90 of 139.0 Gy in the window and of 137.6 Gy on the page.
+#[test]
+fn figures_are_those_of_the_debrief() {
+    let (scene, poses) = (scene(), [pose(0.012), pose(0.02), pose(0.028)]);
+    let window = wait(&mut DoseWorker::default(), &scene, &poses);
+    let seeds = poses.map(|pose| seed_of(&pose, 0.5));
+    let structures = Anatomy::of(&scene).unwrap().structures();
+    let judge = Judge::new(structures, None, &[], window.prescription_gy, &seeds, 1000).unwrap();
+    let kernel = DoseKernel::new(&Source::known(USUAL_SOURCE).unwrap(), Interval::ALL);
+    let page = judge.figures(&judge.judge(&kernel, &seeds));
+    assert_eq!(window.figures, page);
+    assert!(page[0].value > 1.0 && page[1].value > 0.1, "{page:?}");
 }
 
 #[test]

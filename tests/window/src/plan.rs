@@ -318,10 +318,7 @@ fn an_automatic_plan_covers_the_target_without_problems() {
     let prescription = format!("{} seeds of I-125 6711, 145 Gy", planned.seed_count());
     driven.wait_for_label(&prescription);
     // Guards against a violated dose limit next to "The plan has no problems.".
-    let broken = [" %, above", " Gy, above", " %, below", " Gy, below"];
-    let is_broken = broken
-        .iter()
-        .any(|words| driven.window.query_all_by_label_contains(words).count() > 0);
+    let is_broken = driven.window.query_all_by_label_contains(" not met").count() > 0;
     let is_praised = driven.window.query_by_label("The plan has no problems.").is_some();
     assert_ne!(is_broken, is_praised);
     keep_for_docs(&driven.picture("plan-automatic"), "plan");

@@ -2,6 +2,7 @@
 
 use super::{Column, Implant};
 use stylet_anatomy::Organ;
+use stylet_dose::criteria::{DoseStructure, Limit};
 use stylet_dose::effect::Response;
 use stylet_dose::metric::Value;
 use stylet_dose::{Dvh, Metric};
@@ -29,6 +30,8 @@ pub struct Row {
     pub unit: &'static str,
     /// Number of digits after the point.
     pub digits: usize,
+    /// Limit, if it has one.
+    pub limit: Option<Limit>,
     /// Value in each column, or the reason why there is none.
     pub values: Vec<Result<f64, NotComputed>>,
 }
@@ -61,6 +64,7 @@ pub fn rows(implant: &Implant, columns: &[Column]) -> Vec<Row> {
             name: name.to_owned(),
             unit,
             digits,
+            limit: limit(group, name, unit, implant.prescription_gy),
             values: columns.iter().map(of).collect(),
         });
     };
@@ -129,6 +133,22 @@ pub fn rows(implant: &Implant, columns: &[Column]) -> Vec<Row> {
         });
     }
     all
+}
+
+/// Returns the limit of a figure in this unit, of target, urethra or rectum.
+fn limit(group: &str, name: &str, unit: &str, rx_gy: f64) -> Option<Limit> {
+    let structure = match group {
+        "target" => DoseStructure::Target,
+        "urethra" => DoseStructure::Urethra,
+        "rectum" => DoseStructure::Rectum,
+        _ => return None,
+    };
+    let is_it = |metric: &Metric| {
+        let own = if metric.unit() == "gy" { "Gy" } else { "%" };
+        metric.to_string() == name && own == unit
+    };
+    let limited = structure.metrics(rx_gy).into_iter().find(|(metric, _)| is_it(metric));
+    limited.and_then(|(_, limit)| limit)
 }
 
 fn target(column: &Column) -> Result<&Dvh, NotComputed> {

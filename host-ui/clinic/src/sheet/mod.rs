@@ -15,6 +15,7 @@ use stylet_dose::edema::Edema;
 use stylet_dose::structure::bounds;
 use stylet_dose::{DoseKernel, DosePoints, Dvh, Seed, Source, Structure};
 use stylet_implant::registration::RigidFit;
+use stylet_implant::slice::Slice;
 
 /// Margin around seeds and target in which volumes at a dose are searched.
 const MARGIN_M: f64 = 0.03;
@@ -72,6 +73,8 @@ pub struct Column {
     pub at_prescription_m3: Result<f64, NotComputed>,
     /// Sectors of the target.
     pub sectors: Vec<Sector>,
+    /// Middle plane of the target; `None` for one without points.
+    pub slice: Option<Slice>,
     /// True if the dose is that of a gland that swells.
     pub swells: bool,
 }
@@ -79,19 +82,16 @@ pub struct Column {
 impl Column {
     /// Computes the dose of a state, with its edema if one is given.
     pub fn of(implant: &Implant, kernel: &DoseKernel, state: State, edema: Option<Edema>) -> Self {
-        let dose = |structure: &Structure| {
-            let points = DosePoints::new(&structure.points_m);
-            match edema {
-                Some(edema) => {
-                    let half_life_s = implant.source.half_life_s;
-                    edema.dose_gy(kernel, half_life_s, state.seen_s, &state.seeds, &points)
-                }
-                None => points.of_seeds_gy(kernel, &state.seeds),
+        let dose_gy = |points: &DosePoints| match edema {
+            Some(edema) => {
+                let half_life_s = implant.source.half_life_s;
+                edema.dose_gy(kernel, half_life_s, state.seen_s, &state.seeds, points)
             }
+            None => points.of_seeds_gy(kernel, &state.seeds),
         };
         let (mut histograms, mut sectors) = (Vec::new(), Vec::new());
         for (n, structure) in state.structures.iter().enumerate() {
-            let dose_gy = dose(structure);
+            let dose_gy = dose_gy(&DosePoints::new(&structure.points_m));
             if n == state.target {
                 sectors = sectors::of(structure, &dose_gy, implant.prescription_gy);
             }
@@ -107,6 +107,13 @@ impl Column {
                 None => at_prescription_m3(implant, kernel, &state),
             },
             swells: edema.is_some(),
+            slice: Slice::of(
+                &state.structures,
+                state.target,
+                &state.seeds,
+                implant.prescription_gy,
+                &dose_gy,
+            ),
             histograms,
             sectors,
             state,

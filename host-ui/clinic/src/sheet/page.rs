@@ -4,14 +4,18 @@ use super::figures::{DEFINITIONS, NotComputed, Row, rows};
 use super::{Column, Implant};
 use maud::{Markup, PreEscaped, html};
 use stylet_anatomy::Organ;
-use stylet_base::format::printable;
+use stylet_base::format::{self, printable};
+use stylet_dose::criteria::shown;
 use stylet_dose::decay::s_to_days;
 use stylet_dose::effect::Response;
 use stylet_dose::picture::Curve;
+use stylet_implant::slice::Slice;
 use stylet_report::picture::DrawError;
 
 /// Size of the histograms, which leaves the rest on the same sheet.
 const HISTOGRAMS: (u32, u32) = (1100, 250);
+/// Size of a slice.
+const SLICE: (u32, u32) = (240, 236);
 /// Most columns in portrait format.
 const UPRIGHT: usize = 3;
 
@@ -23,6 +27,9 @@ h1{font-size:21px}h2{font-size:14px;margin:12px 0 4px;padding:0;border:0}
 p{margin:4px 0;color:var(--soft)}table{font-size:inherit}th,td{padding:1.5px 8px;text-align:right;white-space:nowrap}td:first-child,th:first-child{text-align:left}.why{white-space:normal;color:var(--soft);font-size:11px}sup{font-size:8px;line-height:0}p.why{margin:3px 8px}
 tr.group td{font-weight:650;border-bottom:1px solid var(--ink);padding-top:7px}
 td:nth-child(2),th:nth-child(2){text-align:left;color:var(--soft)}
+.limits td:nth-child(3),.limits th:nth-child(3){text-align:left;color:var(--soft)}
+.limits th{text-align:left}.limits td.v{text-align:left;padding-left:0;font-size:11px;color:var(--soft)}.limits td.v.bad{color:#a33c00}
+.slices{display:flex;gap:8px;flex-wrap:wrap}.slices>div{width:240px}.slices p{margin:0;font-size:12px}.key{gap:2px 14px;font-size:11px}
 .two{display:grid;grid-template-columns:auto auto;gap:0 26px;align-items:start}
 footer{margin-top:10px;padding-top:6px;font-size:10px;line-height:1.3}
 footer p{margin:1px 0}
@@ -41,13 +48,14 @@ pub fn page(implant: &Implant, columns: &[Column]) -> Result<String, DrawError> 
     let print = format!("@page{{size:A4 {size};margin:9mm}}");
     let sectors = columns.iter().any(|c| !c.sectors.is_empty());
     let histograms = histograms(implant, columns)?;
+    let slices = slices(columns)?;
     let main = html! {
         h1 { "Dose of a permanent implant (AAPM TG-137)" }
         (head(implant, columns))
         div class=[(columns.len() <= UPRIGHT).then_some("two")] {
             div { h2 { "Figures" } (figures(&rows(implant, columns), columns)) }
             @if sectors {
-                div { h2 { "Sectors of the target: D90 (Gy) and V100 (%)" } (of_sectors(columns)) (fits(columns)) }
+                div { h2 { "Sectors of the target: D90 (Gy) and V100 (%)" } (of_sectors(columns)) (fits(columns)) (slices) }
             }
         }
         @if let [first, .., last] = columns {
@@ -89,6 +97,30 @@ fn histograms(implant: &Implant, columns: &[Column]) -> Result<String, DrawError
     stylet_dose::picture::dvh(HISTOGRAMS, &curves.collect::<Vec<_>>(), implant.prescription_gy)
 }
 
+/// Draws the middle plane of the first and the last state.
+fn slices(columns: &[Column]) -> Result<Markup, DrawError> {
+    let still: Vec<&Column> = columns.iter().filter(|c| !c.swells).collect();
+    let ends = [still.first(), still[1.min(still.len())..].last()];
+    let drawn = ends
+        .into_iter()
+        .flatten()
+        .filter_map(|c| Some((c.name.as_str(), c.slice.as_ref()?)));
+    let pictures: Vec<(&str, String)> = drawn
+        .map(|(name, slice)| Ok((name, slice.picture(SLICE)?)))
+        .collect::<Result<_, DrawError>>()?;
+    Ok(html! {
+        @if !pictures.is_empty() {
+            h2 { "Middle plane of the target" }
+            div class="slices" { @for (name, picture) in &pictures { div { p { (name) } (PreEscaped(picture)) } } }
+            div class="key" {
+                span { i class="line" {} "outline" }
+                @for (level, style) in Slice::legend() { span { i class="line" style=(style) {} (level) } }
+                span { "● seed in the plane" }
+            }
+        }
+    })
+}
+
 fn head(implant: &Implant, columns: &[Column]) -> Markup {
     let source = &implant.source;
     html! {
@@ -96,6 +128,7 @@ fn head(implant: &Implant, columns: &[Column]) -> Markup {
             (printable(&implant.title)) " · prescription " (format!("{:.0} Gy", implant.prescription_gy)) " · source "
             (printable(&source.model)) " (" (printable(&source.nuclide))
             (format!(", half-life {:.2} days)", s_to_days(source.half_life_s))) " · strengths " (printable(&implant.calibrated))
+            " · " (format::local_now())
             @if let Some(edema) = implant.edema { " · edema " (edema.to_string()) }
         }
         @for column in columns.iter().filter(|c| !c.swells) {
@@ -112,14 +145,18 @@ fn figures(rows: &[Row], columns: &[Column]) -> Markup {
     let begins = |n: usize| n == 0 || rows[n - 1].group != rows[n].group;
     let reasons = reasons(rows);
     html! {
-        table {
-            thead { tr { th { "" } th { "" } (names(columns)) } }
+        table class="limits" {
+            thead { tr { th { "" } th { "" } th { "limit" } @for column in columns { th colspan="2" { (column.name) } } } }
             tbody {
                 @for (n, row) in rows.iter().enumerate() {
                     @if begins(n) {
-                        tr class="group" { td colspan=(2 + columns.len()) { (row.group) } }
+                        tr class="group" { td colspan=(3 + 2 * columns.len()) { (row.group) } }
                     }
-                    tr { td { (row.name) } td { (row.unit) } (cells(row, &reasons)) }
+                    tr {
+                        td { (row.name) } td { (row.unit) }
+                        td { @if let Some(limit) = row.limit { (limit.to_string()) } }
+                        (cells(row, &reasons))
+                    }
                 }
             }
         }
@@ -152,12 +189,16 @@ fn cells(row: &Row, reasons: &[&NotComputed]) -> Markup {
     let note = |why: &NotComputed| reasons.iter().position(|r| *r == why).map(|n| n + 1);
     html! {
         @if let Some(why) = lacked_by_all(row) {
-            td class="why" colspan=(row.values.len()) { "not computed: " (why.to_string()) }
+            td class="why" colspan=(2 * row.values.len()) { "not computed: " (why.to_string()) }
         } @else {
             @for value in &row.values {
                 @match value {
-                    Ok(value) => td { (format!("{value:.*}", row.digits)) },
-                    Err(why) => td { "–" @if let Some(n) = note(why) { sup { (n) } } },
+                    Ok(value) => {
+                        td { (shown(*value, row.limit, row.digits)) }
+                        @let is_bad = row.limit.is_some_and(|limit| !limit.is_met(*value));
+                        td.v.bad[is_bad] { @if let Some(limit) = row.limit { (limit.verdict(*value)) } }
+                    },
+                    Err(why) => { td { "–" @if let Some(n) = note(why) { sup { (n) } } } td.v {} },
                 }
             }
         }
@@ -195,7 +236,7 @@ fn fits(columns: &[Column]) -> Markup {
         @if fitted().next().is_some() {
             h2 { "Fit of the seeds to the plan" }
             table {
-                thead { tr { th { "" } th { "pairs" } th { "mean" br; "(mm)" } th { "worst" br; "(mm)" } th { "turn" br; "(deg)" } th { "extent" } } }
+                thead { tr { th { "" } th { "pairs" } th { "mean" br; "(mm)" } th { "worst" br; "(mm)" } th { "turn" br; "(°)" } th { "extent" } } }
                 tbody {
                     @for (column, fit) in fitted() {
                         tr {

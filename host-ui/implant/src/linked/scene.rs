@@ -21,8 +21,7 @@ use stylet_files::dicom::{self, Identity};
 use stylet_files::{ContentError, FileError, Progress, VoxelFrame, Voxels, bytes, read_voxels, scene as scene_file};
 use stylet_host::link::SceneModel;
 
-/// Pitch of the points of the histograms, as in every evaluation of a plan, and side of a voxel of
-/// the dose.
+/// Side of a voxel of the dose.
 const PITCH_M: f64 = 1e-3;
 const POINTS: usize = 100_000;
 /// Margin of the grid around structures and seeds.
@@ -103,7 +102,7 @@ pub fn write(
     };
     let seeds: Vec<Seed> = plan.seeds().into_iter().map(in_patient).collect();
     let judge = Judge::new(
-        anatomy.structures(PITCH_M),
+        anatomy.structures(),
         Some(&anatomy.target.name),
         &[],
         plan.prescription_gy,

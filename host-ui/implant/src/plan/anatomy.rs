@@ -15,6 +15,9 @@ use stylet_surfaces::bodies::{Bodies, Follows, shown_alone};
 /// Step of the search along a needle's path.
 const STEP_M: f64 = 0.5e-3;
 
+/// Pitch of the points in which the dose of every plan and every implant is counted.
+pub const DOSE_PITCH_M: f64 = 1e-3;
+
 /// Small offset at which a place is tested. Lines of a template run along the planes on which
 /// corners of a mesh lie, where inside and outside are ambiguous.
 const EDGE_REACH_M: [f64; 3] = [0.0, 1.37e-8, 2.71e-8];
@@ -203,10 +206,10 @@ impl Anatomy {
         })
     }
 
-    /// Returns the structures in which dose is counted, the target first.
-    pub fn structures(&self, pitch_m: f64) -> Vec<Structure> {
+    /// Returns the structures in which dose is counted, at [`DOSE_PITCH_M`], the target first.
+    pub fn structures(&self) -> Vec<Structure> {
         let bodies = std::iter::once(&self.target).chain(&self.spared);
-        bodies.map(|b| b.structure(pitch_m)).collect()
+        bodies.map(|b| b.structure(DOSE_PITCH_M)).collect()
     }
 
     /// Returns the first spared structure that the needle enters within `margin_m` on its way to

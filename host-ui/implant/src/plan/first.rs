@@ -1,5 +1,6 @@
 //! The automatic plan by inverse planning, and others to choose from.
 
+use super::anatomy::DOSE_PITCH_M;
 use super::optimise::{self, Objectives, Proposal, Search, Statistic};
 use super::{Anatomy, ImplantPlan, PlanError, Template};
 use std::ops::ControlFlow;
@@ -22,8 +23,6 @@ pub struct FirstPlan {
 const NO_URETHRA: &str = "no urethra is known, so its dose has no limit";
 /// Cost of a needle in a plan with few of them.
 const FEW_NEEDLES: f32 = 6e-3;
-/// Pitch of the points for the strength of a plan, m.
-const DOSE_PITCH_M: f64 = 1e-3;
 /// Share of the target that gets the prescription at that strength.
 const COVERED: f64 = 0.96;
 

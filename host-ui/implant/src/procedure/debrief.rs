@@ -54,6 +54,8 @@ pub fn write(
             .filter_map(|&n| drops.get(n))
             .filter_map(planned)
             .collect(),
+        // A script drops planned seeds only.
+        unplanned: Vec::new(),
         anatomy: &anatomy,
         kernel: &kernel,
         source: format!("{} {}", source.nuclide, source.model),

@@ -60,13 +60,16 @@ fn each_needle_has_the_seeds_that_came_after_its_plan() {
     heard.hear(&plan(2, 3), &seeds);
     assert!(heard.is_whole());
     assert_eq!(placed(&heard)[2..], [(2, Some(2)), (2, Some(3))]);
-    let (pairs, lost) = heard.pairs(0.5);
-    assert!(lost.is_empty() && pairs.iter().all(|p| (p.offset().along_m - 2e-3).abs() < 1e-12));
+    let (pairs, lost, unplanned) = heard.pairs(0.5);
+    assert!(lost.is_empty() && unplanned.is_empty() && pairs.iter().all(|p| (p.offset().along_m - 2e-3).abs() < 1e-12));
     assert!(
         pairs
             .iter()
             .all(|p| p.planned.strength_u == 0.4 && p.delivered.strength_u == 0.4)
     );
+    // A third seed of a needle with two places has no plan.
+    heard.hear(&plan(2, 3), &[&seeds[..], &[seed(3, 0.03)]].concat());
+    assert_eq!(heard.pairs(0.5).2.len(), 1);
     // A needle that is planned again keeps its seeds; one by hand is separate.
     heard.hear(&plan(3, 3), &seeds[..3]);
     assert_eq!(placed(&heard)[2..], [(2, Some(2)), (2, None)]);

@@ -51,7 +51,8 @@ impl<'a> Field<'a> {
     }
 }
 
-/// Returns the costs in the order of the seeds; `structures` begins with the target.
+/// Returns the costs in the order of the planned seeds; `delivered` has theirs first, then the
+/// others in the tissue. `structures` begins with the target.
 pub fn costs(
     structures: &[Structure],
     kernel: &DoseKernel,

@@ -23,7 +23,6 @@ use stylet_shm_schema::{SeedPose, TickRecord, touching};
 pub use trace::Trace;
 pub use write::{to_json, write};
 
-const DOSE_PITCH_M: f64 = 1e-3;
 const POINTS: usize = 100_000;
 
 /// Seed, planned and delivered, scene frame.
@@ -42,11 +41,7 @@ pub struct SeedPair {
 impl SeedPair {
     /// Creates the pair of a planned seed and the one that was dropped for it.
     pub fn new((needle, hole): (usize, Option<Hole>), planned: Seed, pose: &SeedPose) -> Self {
-        let delivered = Seed {
-            position_m: pose.position_m,
-            axis: Some(pose.axis),
-            ..planned
-        };
+        let delivered = seed_of(pose, planned.strength_u);
         Self {
             needle,
             hole,
@@ -64,6 +59,15 @@ impl SeedPair {
     /// Returns the distance from plan, m.
     pub fn error_m(&self) -> f64 {
         self.offset().distance_m()
+    }
+}
+
+/// Returns a seed in the tissue as one for dose.
+pub fn seed_of(pose: &SeedPose, strength_u: f64) -> Seed {
+    Seed {
+        position_m: pose.position_m,
+        axis: Some(pose.axis),
+        strength_u,
     }
 }
 
@@ -95,6 +99,8 @@ pub struct Implant<'a> {
     pub pairs: Vec<SeedPair>,
     /// Planned seeds that were not delivered.
     pub lost: Vec<Seed>,
+    /// Seeds in the tissue without a planned one; they count in the delivered dose.
+    pub unplanned: Vec<Seed>,
     /// Target and spared structures.
     pub anatomy: &'a Anatomy,
     /// Dose of one seed.
@@ -145,9 +151,10 @@ impl<'a> Score<'a> {
             return Err(ScoreError::NoSeed);
         }
         let seeds = |one: fn(&SeedPair) -> Seed| implant.pairs.iter().map(one).collect::<Vec<_>>();
-        let (on_plan, delivered) = (seeds(|p| p.planned), seeds(|p| p.delivered));
+        let (on_plan, mut delivered) = (seeds(|p| p.planned), seeds(|p| p.delivered));
+        delivered.extend_from_slice(&implant.unplanned);
         let planned = [on_plan.clone(), implant.lost.clone()].concat();
-        let structures = implant.anatomy.structures(DOSE_PITCH_M);
+        let structures = implant.anatomy.structures();
         let target = implant.anatomy.target.name.clone();
         let costs = costs(
             &structures,
@@ -165,6 +172,17 @@ impl<'a> Score<'a> {
             costs,
             implant,
         })
+    }
+
+    /// Returns the number of seeds in the tissue.
+    pub fn seeds(&self) -> usize {
+        self.implant.pairs.len() + self.implant.unplanned.len()
+    }
+
+    /// Returns whether all seeds are of one needle, whose dose has no limits to meet.
+    pub fn is_one_needle(&self) -> bool {
+        let pairs = &self.implant.pairs;
+        pairs.iter().all(|pair| pair.needle == pairs[0].needle)
     }
 
     /// Returns the time of a moment since the first record, s.

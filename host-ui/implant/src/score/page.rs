@@ -3,6 +3,7 @@
 use super::{Score, ScoreError, picture, updates};
 use maud::{Markup, PreEscaped, html};
 use stylet_base::format;
+use stylet_dose::criteria::shown;
 use stylet_host::moments::Moment;
 use stylet_report::parts::{self, Column, cell};
 
@@ -18,8 +19,8 @@ pub fn page(score: &Score) -> Result<String, ScoreError> {
     let main = html! {
         h1 { "Debrief" }
         p {
-            (i.title) " · " (i.pairs.len()) " seeds " (i.source) " · prescription "
-            (format!("{:.0}", i.prescription_gy)) " Gy"
+            (i.title) " · " (score.seeds()) " seeds " (i.source) " · prescription "
+            (format!("{:.0}", i.prescription_gy)) " Gy · " (format::local_now())
         }
         (lost(score))
         (cards(score))
@@ -83,6 +84,13 @@ fn lost(score: &Score) -> Markup {
         @if lost > 0 {
             p class="bad" {
                 (lost) " of " (placed + lost) " planned seeds were lost: the tip was outside the tissue when they were dropped."
+            }
+        }
+        @let (others, all) = (score.implant.unplanned.len(), score.seeds());
+        @if others > 0 {
+            p class="note" {
+                (others) " of the " (all) " seeds " (if others == 1 { "has" } else { "have" })
+                " no planned place, and no row below. The delivered dose is that of all."
             }
         }
     }
@@ -152,7 +160,8 @@ fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Returns every measure of every structure, planned next to delivered.
+/// Returns every measure of every structure, planned next to delivered, and whether that meets its
+/// limit.
 fn measures(score: &Score) -> Markup {
     let (planned, delivered) = (score.judge.values(&score.planned), score.judge.values(&score.delivered));
     let number = |v: &Option<f64>, name: &str| {
@@ -162,17 +171,32 @@ fn measures(score: &Score) -> Markup {
         (Some(b), Some(a)) => format::signed(a - b, decimals(name)),
         _ => String::new(),
     };
+    let criteria = match score.is_one_needle() {
+        true => Vec::new(),
+        false => score.judge.criteria(),
+    };
+    let limit_of = |name: &str| criteria.iter().find(|c| c.measure == name).map(|c| c.limit);
+    let number = |v: &Option<f64>, name: &str| match (v, limit_of(name)) {
+        (Some(v), limit @ Some(_)) => shown(*v, limit, decimals(name)),
+        _ => number(v, name),
+    };
+    let verdict = |name: &str, after: &Option<f64>| match (limit_of(name), after) {
+        (Some(limit), Some(after)) if limit.is_met(*after) => cell(limit.verdict(*after)),
+        (Some(limit), Some(after)) => html! { span class="bad" { (limit.verdict(*after)) } },
+        _ => cell(""),
+    };
     let both = planned.iter().zip(&delivered);
     let rows = both.map(|((name, before), (_, after))| {
         let change = change(before, after, name);
-        [named(name), number(before, name), number(after, name), change]
-            .map(cell)
-            .into()
+        let limit = limit_of(name).map_or_else(String::new, |limit| limit.to_string());
+        let figures = [named(name), number(before, name), number(after, name), change, limit];
+        figures.map(cell).into_iter().chain([verdict(name, after)]).collect()
     });
-    parts::numbers(
-        &["Measure", "planned", "delivered", "change"],
-        &rows.collect::<Vec<_>>(),
-    )
+    let head = ["Measure", "planned", "delivered", "change", "limit", "delivered dose"];
+    html! {
+        (parts::numbers(&head, &rows.collect::<Vec<_>>()))
+        @if score.is_one_needle() { p class="note" { "One needle is no implant: its dose has no limits to meet." } }
+    }
 }
 
 fn decimals(name: &str) -> usize {

@@ -58,6 +58,7 @@ fn score<'a>(off: &[usize], anatomy: &'a Anatomy, kernel: &'a DoseKernel, record
         title: "a <test>".to_owned(),
         pairs: pairs(off),
         lost: Vec::new(),
+        unplanned: Vec::new(),
         anatomy,
         kernel,
         source: "6711".to_owned(),
@@ -175,7 +176,7 @@ fn the_only_misplaced_seed_has_the_whole_cost() {
     let [mean, worst] = score.errors_m();
     assert!((mean - 6e-3 / 36.0).abs() < 1e-12 && (worst - 6e-3).abs() < 1e-12);
     // Dose of all seeds recomputed with this one on plan: the plan itself.
-    let structures = anatomy.structures(DOSE_PITCH_M);
+    let structures = anatomy.structures();
     let value = |one: fn(&SeedPair) -> Seed, structure: usize, name: &str| {
         let seeds: Vec<Seed> = score.implant.pairs.iter().map(one).collect();
         let dose = DosePoints::new(&structures[structure].points_m).of_seeds_gy(&kernel, &seeds);
@@ -211,6 +212,24 @@ fn a_lost_seed_counts_in_the_planned_dose_only() {
     assert!((d90(&less.planned) - d90(&all.planned)).abs() < 1e-6);
     assert!(d90(&less.delivered) < d90(&all.delivered) - 0.5);
     assert_eq!(to_json(&less)["seeds_lost"], 1);
+}
+
+/// Guards against a D90 of 137.6 Gy on the page next to 139.0 Gy of all seeds in the window.
+#[test]
+fn a_seed_without_a_plan_counts_in_the_delivered_dose() {
+    let (anatomy, kernel) = (anatomy(), kernel());
+    let whole = score(&[], &anatomy, &kernel, &[]);
+    let mut implant = score(&[], &anatomy, &kernel, &[]).implant;
+    implant.unplanned.push(implant.pairs.remove(7).delivered);
+    let other = Score::of(implant).unwrap();
+    let d90 = |v: &Verdict| Metric::parse("D90").unwrap().of(&v.dvhs[0], 145.0).main().unwrap();
+    assert!((d90(&other.delivered) - d90(&whole.delivered)).abs() < 1e-6);
+    assert_eq!((other.seeds(), whole.seeds()), (36, 36));
+    assert!(
+        page::page(&other)
+            .unwrap()
+            .contains("1 of the 36 seeds has no planned place")
+    );
 }
 
 #[test]

@@ -28,7 +28,7 @@ pub fn to_json(score: &Score) -> Value {
     let m = &score.implant.motion;
     json!({
         "title": i.title, "source": i.source, "prescription_gy": i.prescription_gy,
-        "seeds_planned": i.pairs.len() + i.lost.len(), "seeds_lost": i.lost.len(),
+        "seeds_planned": i.pairs.len() + i.lost.len(), "seeds_lost": i.lost.len(), "seeds_unplanned": i.unplanned.len(),
         "mean_error_mm": mean * 1e3, "worst_error_mm": worst * 1e3,
         "planned": score.judge.to_json(&score.planned),
         "delivered": score.judge.to_json(&score.delivered),

@@ -1,7 +1,7 @@
 //! The debrief: the error of each seed, the dose with its limits, the histogram of the target.
 
 use crate::action::Action;
-use crate::dose_worker::{DoseOf, DoseResult, Figure, Limit};
+use crate::dose_worker::{DoseOf, DoseResult, Figure};
 use crate::panel::axis::{plot, upwards};
 use crate::shown::{SeedError, Shown, all_errors};
 use crate::theme;
@@ -59,9 +59,9 @@ pub fn dose_ui(ui: &mut egui::Ui, shown: &Shown, height: f32, otherwise: &str) {
     }
     ui.spacing_mut().interact_size.y = 16.0;
     egui::Grid::new("dose")
-        .num_columns(4)
+        .num_columns(5)
         .striped(true)
-        .spacing([10.0, 2.0])
+        .spacing([5.0, 2.0])
         .show(ui, |ui| {
             for figure in &dose.figures {
                 figure_ui(ui, figure);
@@ -72,25 +72,16 @@ pub fn dose_ui(ui: &mut egui::Ui, shown: &Shown, height: f32, otherwise: &str) {
 
 fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
     let tokens = theme::of(ui);
-    let unit = match figure.metric.unit() {
-        "gy" => "Gy",
-        _ => "%",
-    };
     ui.label(theme::small(&figure.structure));
     let metric = figure.metric.to_string();
     ui.label(&metric).explained(&metric);
-    ui.monospace(format!("{:.1} {unit}", figure.value));
-    let Some(limit) = figure.limit else {
-        ui.label("");
-        return ui.end_row();
-    };
-    // The word repeats the meaning of the colour.
-    let (word, color) = match (limit.is_met(figure.value), limit) {
-        (true, _) => ("met".to_owned(), tokens.good),
-        (false, Limit::AtLeast(value)) => (format!("below {value:.0}"), tokens.bad),
-        (false, Limit::AtMost(value)) => (format!("above {value:.0}"), tokens.bad),
-    };
-    ui.label(RichText::new(word).color(color));
+    ui.monospace(figure.shown());
+    if let Some(limit) = figure.limit {
+        ui.label(theme::small(limit.to_string()));
+        let is_met = limit.is_met(figure.value);
+        let color = if is_met { tokens.good } else { tokens.bad };
+        ui.label(RichText::new(limit.verdict(figure.value)).color(color));
+    }
     ui.end_row();
 }
 

@@ -1,12 +1,9 @@
 //! Measures of the objectives, at the points of the full dose engine and at those of the search.
 
 use super::samples::{RECTUM_M3, Samples};
-use crate::plan::anatomy::Body;
+use crate::plan::anatomy::{Body, DOSE_PITCH_M};
 use crate::plan::dose::{DoseKernel, DosePoints, Dvh, Seed, Structure};
 use std::fmt;
-
-/// Pitch of the full engine's points, as in every evaluation of a plan.
-const DOSE_PITCH_M: f64 = 1e-3;
 
 /// Measures of a plan in percent, of the target or of the prescription; `None` for a missing
 /// structure.
