@@ -283,7 +283,9 @@ fn seeds_are_projected_to_a_pixel() {
                 }],
                 ..Metal::default()
             };
-            let clear = scope.shoot(&arm, &Attenuation::of_cells(&body), &still, &Metal::default()).clone();
+            let clear = scope
+                .shoot(&arm, &Attenuation::of_cells(&body), &still, &Metal::default())
+                .clone();
             let dark = scope.shoot(&arm, &Attenuation::of_cells(&body), &still, &metal);
             let (mut sum, mut whole) = (Vector2::zeros(), 0.0);
             for (n, (before, after)) in clear.transmission.iter().zip(&dark.transmission).enumerate() {
