@@ -299,7 +299,11 @@ impl App {
     fn apply_settings(&mut self, ctx: &egui::Context) {
         self.settings.take_keys(ctx);
         let fit = settings::fit_of(ctx);
-        if self.applied.as_ref().is_none_or(|(of, before)| *of != self.settings || *before != fit) {
+        if self
+            .applied
+            .as_ref()
+            .is_none_or(|(of, before)| *of != self.settings || *before != fit)
+        {
             self.settings.apply(ctx, fit);
             self.applied = Some((self.settings.clone(), fit));
         }

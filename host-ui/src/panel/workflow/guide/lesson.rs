@@ -122,8 +122,15 @@ fn place(shown: &Shown) -> Lesson {
 fn insert(shown: &Shown, membranes: &MetMembranes, needle: &AtHand) -> Lesson {
     if shown.needle_line() == Some(NeedleLine::Preparing) {
         let wait = shown.line_wait.words();
-        let so_far = if wait.is_empty() { wait } else { format!(" Waited {wait}.") };
-        return of(format!("Wait here until LINE READY stands in the bar at the top.{so_far}"), &[]);
+        let so_far = if wait.is_empty() {
+            wait
+        } else {
+            format!(" Waited {wait}.")
+        };
+        return of(
+            format!("Wait here until LINE READY stands in the bar at the top.{so_far}"),
+            &[],
+        );
     }
     if let Some(share) = shown.membrane_tension() {
         return Lesson {
