@@ -11,7 +11,7 @@ COMPRESSED = --features stylet-files/compressed
 PACKAGED = $(COMPRESSED) --features host-ui/screen-reader
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release reproducible sbom package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: animation attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release reproducible sbom package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -61,6 +61,9 @@ package-test: deps-package-test package ## Install both packages in a fresh Debi
 
 picture: deps-test build ## Redraw the pictures of the README and the tour
 	UPDATE_SNAPSHOTS=1 $(CARGO) test --profile quick -p stylet-tests-window -- --test-threads=1
+
+animation: deps-test ## Redraw the moving picture of the README from the recorded example (some minutes)
+	$(CARGO) test --profile quick -p stylet-tests-window --lib animation -- --ignored --nocapture
 
 example: build ## Record the example session of the window again
 	docs/tools/example "$(BIN)"

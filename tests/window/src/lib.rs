@@ -1,6 +1,8 @@
 //! The window by its labels and its kept pictures, and clipped or overlapping parts.
 
 #[cfg(test)]
+mod animation;
+#[cfg(test)]
 mod controllers;
 #[cfg(test)]
 mod driven;
