@@ -29,7 +29,7 @@ tr.group td{font-weight:650;border-bottom:1px solid var(--ink);padding-top:7px}
 td:nth-child(2),th:nth-child(2){text-align:left;color:var(--soft)}
 .limits td:nth-child(3),.limits th:nth-child(3){text-align:left;color:var(--soft)}
 .limits th{text-align:left}.limits td.v{text-align:left;padding-left:0;font-size:11px;color:var(--soft)}.limits td.v.bad{color:#a33c00}
-.slices{display:flex;gap:8px;flex-wrap:wrap}.slices>div{width:240px}.slices p{margin:0;font-size:12px}.key{gap:2px 14px;font-size:11px}
+.slices{display:grid;grid-template-columns:1fr 1fr;gap:6px}.slices p{margin:0;font-size:12px}.key{gap:2px 14px;font-size:11px}
 .two{display:grid;grid-template-columns:auto auto;gap:0 26px;align-items:start}
 footer{margin-top:10px;padding-top:6px;font-size:10px;line-height:1.3}
 footer p{margin:1px 0}
