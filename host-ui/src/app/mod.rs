@@ -299,11 +299,8 @@ impl App {
     fn apply_settings(&mut self, ctx: &egui::Context) {
         self.settings.take_keys(ctx);
         let fit = settings::fit_of(ctx);
-        if self
-            .applied
-            .as_ref()
-            .is_none_or(|(of, before)| *of != self.settings || *before != fit)
-        {
+        let applied = self.applied.as_ref();
+        if applied.is_none_or(|(of, before)| *of != self.settings || *before != fit) {
             self.settings.apply(ctx, fit);
             self.applied = Some((self.settings.clone(), fit));
         }
@@ -318,10 +315,8 @@ impl App {
                 ..Wish::REST
             };
         }
-        match (
-            self.shown.has_focus && self.question.is_none(),
-            ctx.input(|i| i.modifiers.shift),
-        ) {
+        let may_move = self.shown.has_focus && self.question.is_none();
+        match (may_move, ctx.input(|i| i.modifiers.shift)) {
             (false, _) => Wish::REST,
             (true, false) => self.shown.controllers.wish,
             (true, true) => self.shown.controllers.wish.slower(SLOW),
