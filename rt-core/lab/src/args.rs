@@ -79,7 +79,8 @@ pub struct LatencyArgs {
     /// Challenge of whoever asks for the measurement: it stands in the report, and its signature covers it
     #[arg(long, value_name = "TEXT")]
     pub nonce: Option<String>,
-    /// Folder for report.json, report.html, histograms.hlog and wakes.txt; a report that is there is not overwritten
+    /// Folder for report.html, report.json, the raw data, and files for other programs; a report that is there is not
+    /// overwritten
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     #[command(flatten)]

@@ -1,11 +1,12 @@
-//! The files of a measurement: JSON, page and raw histograms, each with its digest.
+//! The files of a measurement: report, raw data, and what is computed from them, each with its digest.
 
+use crate::cyclictest;
 use crate::disk::DiskError;
 use crate::html;
 use crate::plots::DrawError;
 use crate::provenance::sha256;
 use crate::raw::{Raw, RawError};
-use crate::report::{FileDigest, HISTOGRAMS, JSON, PAGE, Report, WAKES};
+use crate::report::{CYCLICTEST, FileDigest, HISTOGRAMS, JSON, OSADL, PAGE, Report, WAKES};
 use crate::sealed::seal;
 use std::path::Path;
 use stylet_write::write_whole;
@@ -30,12 +31,24 @@ pub fn write(folder: &Path, report: &mut Report, raw: &Raw) -> Result<(), FilesE
     };
     let (log, wakes) = (raw.log(report.protocol.measured_s)?, raw.wakes());
     report.files = vec![digest(HISTOGRAMS, &log), digest(WAKES, wakes.as_bytes())];
-    let page = html::page(report, raw)?;
-    report.files.push(digest(PAGE, page.as_bytes()));
+    let derived = derived(report, raw)?;
+    let digests = derived.iter().map(|(name, text)| digest(name, text.as_bytes()));
+    report.files.extend(digests);
     put(HISTOGRAMS, &log)?;
     put(WAKES, wakes.as_bytes())?;
-    put(PAGE, page.as_bytes())?;
+    for (name, text) in &derived {
+        put(name, text.as_bytes())?;
+    }
     Ok(put(JSON, seal(&text(report)?).as_bytes())?)
+}
+
+/// Returns the files that report and raw data determine.
+pub fn derived(report: &Report, raw: &Raw) -> Result<[(&'static str, String); 3], FilesError> {
+    Ok([
+        (CYCLICTEST, cyclictest::json(report, raw).map_err(DiskError::from)?),
+        (OSADL, html::osadl(report, raw)?),
+        (PAGE, html::page(report, raw)?),
+    ])
 }
 
 /// Returns the report as its file holds it.

@@ -1,16 +1,17 @@
 //! Detects lost time that the kernel does not account for: in a virtual machine its own count may stay 0.
 //!
-//! A thread on another core spins for a tenth of each millisecond and reads the clock. A gap without a thread switch is
-//! an interrupt, firmware, or a hypervisor that ran something else.
+//! A thread spins for a part of each millisecond and reads the clock: on another core beside the loop, and on the
+//! loop's own core before it starts. A gap without a thread switch is an interrupt, firmware, or a hypervisor that ran
+//! something else.
 
 use crate::sample::histogram;
 use hdrhistogram::Histogram;
-use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_runtime::rt::arm::{self, Ask, Usage};
 use stylet_runtime::rt::clock;
 
-const PERIOD_NS: u64 = 1_000_000;
-const SPIN_NS: u64 = 100_000;
+pub const PERIOD_NS: u64 = 1_000_000;
+/// Part of each period that is watched beside the loop.
+pub const SPIN_NS: u64 = 100_000;
 /// Phase away from the measured wake-ups: neither the force loop nor the tissue loop wakes during this spin, at 1 kHz.
 const PHASE_NS: u64 = 800_000;
 /// Two reads of the clock farther apart than this were interrupted.
@@ -27,10 +28,13 @@ pub struct GapReport {
     pub watched_ns: u64,
     /// Gaps longer than 20 us without a switch.
     pub gaps: Histogram<u64>,
+    /// Gaps longer than 20 us in which another thread had the core.
+    pub switched: Histogram<u64>,
     /// Lateness of the thread's wake-ups; nothing of normal priority can delay it.
     pub wake: Histogram<u64>,
-    /// Begin and length of the first gaps.
+    /// Begin and length of the first gaps of both kinds.
     pub found: Vec<(u64, u64)>,
+    pub found_switched: Vec<(u64, u64)>,
     /// Due time and lateness of the first wake-ups that were very late.
     pub late: Vec<(u64, u64)>,
 }
@@ -54,54 +58,70 @@ fn longest_overlap(all: &[(u64, u64)], from_ns: u64, to_ns: u64) -> Option<u64> 
     overlap.map(|(_, length)| *length).max()
 }
 
-/// Watches from `core` at `priority` until `stop`.
-pub fn watch(core: Option<usize>, priority: Option<u32>, stop: &AtomicBool) -> GapReport {
+/// How a core is watched.
+#[derive(Clone, Copy)]
+pub struct Look {
+    pub core: Option<usize>,
+    pub priority: Option<u32>,
+    /// Part of each millisecond.
+    pub spin_ns: u64,
+}
+
+/// Watches until `stop`.
+pub fn watch(look: Look, stop: impl Fn() -> bool) -> GapReport {
+    let Look { core, priority, .. } = look;
     let mut report = GapReport {
         core,
         watched_ns: 0,
         gaps: histogram(),
+        switched: histogram(),
         wake: histogram(),
         found: Vec::with_capacity(KEPT),
+        found_switched: Vec::with_capacity(KEPT),
         late: Vec::with_capacity(KEPT),
     };
     // Without the right to a priority it watches at normal priority: it distinguishes gaps from switches either way.
     let _armed = arm::arm(Ask { priority, core }).or_else(|_| arm::arm(Ask { priority: None, core }));
     let mut grid = clock::Grid::at_phase(clock::now_ns(), PERIOD_NS, PHASE_NS);
-    // SYNC: nothing but the flag is carried.
-    while !stop.load(Ordering::Acquire) {
+    while !stop() {
         clock::sleep_until(grid.due_ns);
         let late_ns = clock::now_ns().saturating_sub(grid.due_ns);
         report.wake.saturating_record(late_ns);
         if late_ns > LATE_NS && report.late.len() < KEPT {
             report.late.push((grid.due_ns, late_ns));
         }
-        spin(&mut report);
+        report.spin(look.spin_ns);
         grid.advance(clock::now_ns());
     }
     report
 }
 
-fn spin(report: &mut GapReport) {
-    let switches = |u: Usage| u.involuntary_switches + u.voluntary_switches;
-    let mut before = switches(Usage::now());
-    let begin_ns = clock::now_ns();
-    let mut last_ns = begin_ns;
-    while last_ns - begin_ns < SPIN_NS {
-        let now_ns = clock::now_ns();
-        let gap_ns = now_ns - last_ns;
-        if gap_ns > GAP_NS {
-            let after = switches(Usage::now());
-            if after == before {
-                report.gaps.saturating_record(gap_ns);
-                if report.found.len() < KEPT {
-                    report.found.push((last_ns, gap_ns));
+impl GapReport {
+    fn spin(&mut self, spin_ns: u64) {
+        let switches = |u: Usage| u.involuntary_switches + u.voluntary_switches;
+        let mut before = switches(Usage::now());
+        let begin_ns = clock::now_ns();
+        let mut last_ns = begin_ns;
+        while last_ns - begin_ns < spin_ns {
+            let now_ns = clock::now_ns();
+            let gap_ns = now_ns - last_ns;
+            if gap_ns > GAP_NS {
+                let after = switches(Usage::now());
+                let (gaps, found) = if after == before {
+                    (&mut self.gaps, &mut self.found)
+                } else {
+                    (&mut self.switched, &mut self.found_switched)
+                };
+                gaps.saturating_record(gap_ns);
+                if found.len() < KEPT {
+                    found.push((last_ns, gap_ns));
                 }
+                before = after;
             }
-            before = after;
+            last_ns = now_ns;
         }
-        last_ns = now_ns;
+        self.watched_ns += last_ns - begin_ns;
     }
-    report.watched_ns += last_ns - begin_ns;
 }
 
 #[cfg(test)]

@@ -5,9 +5,10 @@ mod machine;
 mod steady;
 pub mod times;
 
-use crate::plots::{self, BLUE, DrawError, ORANGE, Series};
+use crate::cyclictest;
+use crate::plots::{self, BLUE, DrawError, Limit, ORANGE, Series};
 use crate::raw::Raw;
-use crate::report::{HISTOGRAMS, Report};
+use crate::report::{CYCLICTEST, HISTOGRAMS, OSADL, Report};
 use crate::verdict::{LimitResult, Outcome};
 use crate::whose::Whose;
 use maud::{Markup, PreEscaped, html};
@@ -39,6 +40,7 @@ pub fn page(report: &Report, raw: &Raw) -> Result<String, DrawError> {
         (machine::stiffness(report))
         (machine::counters(report))
         (times::late(report))
+        (times::noise(report))
         (causes::causes(report))
         (steady::steady(report))
         (machine::provenance(report))
@@ -144,14 +146,27 @@ pub fn limits(all: &[LimitResult]) -> Markup {
 }
 
 fn pictures(r: &Report, raw: &Raw) -> Result<Markup, DrawError> {
-    let series = |name, color, histogram| Series { name, color, histogram };
+    let series = |name, color, histogram| Series {
+        name,
+        color,
+        histogram,
+        limits: Vec::new(),
+    };
     let [wake, work] = ["haptic/wake", "haptic/work"].map(|name| raw.get(name));
-    let force = || series("force loop", BLUE, &wake);
-    let own = series("own work", ORANGE, &work);
+    let limited = |name, color, histogram, of| Series {
+        limits: limits_of(r, of),
+        ..series(name, color, histogram)
+    };
+    let force = || limited("force loop", BLUE, &wake, "wake");
+    let own = limited("own work", ORANGE, &work, "work");
+    let worst_us = force().limits.iter().find(|l| l.share == 0.0).map_or(0.0, |l| l.us);
     let mut figures = vec![
         ("Wake-up of the force loop", plots::wake_histogram(&[force()])?),
         ("Where a force tick goes", stages(raw, "haptic")?),
-        ("Worst of each window", plots::windows(&r.windows, r.protocol.window_s)?),
+        (
+            "Worst of each window",
+            plots::windows(&r.windows, r.protocol.window_s, worst_us)?,
+        ),
         ("Cumulative tail", plots::tail(&[force(), own])?),
         ("Where a tissue tick goes", stages(raw, "tissue")?),
     ];
@@ -175,7 +190,36 @@ fn pictures(r: &Report, raw: &Raw) -> Result<Markup, DrawError> {
                 figure { figcaption { (title) } (PreEscaped(svg)) }
             }
         }
+        h2 { "Wake-ups of every measured core" }
+        figure { (PreEscaped(osadl(r, raw)?)) }
+        p class="faint" {
+            "In the form of OSADL's latency plots: a step for each microsecond. From 1 ms on a histogram's bin is wider than a \
+             step, 0.1 % of the time. The same counts are in " code { (CYCLICTEST) } ", in the layout of "
+            code { "cyclictest --json" } ", and the picture is " code { (OSADL) } "."
+        }
     })
+}
+
+/// Plots the wake-ups of every measured core as OSADL does.
+pub fn osadl(r: &Report, raw: &Raw) -> Result<String, DrawError> {
+    let missed = r.haptic.counts.missed_deadlines;
+    plots::osadl(&cyclictest::cores(r, raw), &limits_of(r, "wake"), missed)
+}
+
+/// Returns the limits of a time of the force loop.
+fn limits_of(r: &Report, of: &str) -> Vec<Limit> {
+    let all = r.verdict.limits.iter();
+    let limit = |l: &LimitResult| {
+        let at = l.name.strip_prefix(of)?.strip_prefix('_')?.strip_suffix("_us")?;
+        let shares = [("p50", 0.5), ("p99", 0.01), ("p99.9", 0.001), ("max", 0.0)];
+        let (name, share) = shares.into_iter().find(|(name, _)| name.replace('.', "") == at)?;
+        Some(Limit {
+            name,
+            share,
+            us: l.limit,
+        })
+    };
+    all.filter_map(limit).collect()
 }
 
 /// Plots the stages of a loop's tick: everything between jitter and work.

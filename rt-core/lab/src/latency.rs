@@ -156,6 +156,7 @@ fn setup_of<'a>(args: &LatencyArgs, out: &'a Path, options: &'a Options) -> Setu
         trace_over_ns: args.trace_over_ns(),
         toggle: args.toggle,
         witness: args.witness,
+        noise: true,
         ..Setup::new(options, args.duration, args.load, out)
     }
 }
@@ -177,6 +178,9 @@ fn print_verdict(report: &Report) {
         );
     }
     println!("{}", report.others.words());
+    if let Some(noise) = &report.noise {
+        println!("{}", noise.words());
+    }
     if let Some(paired) = &report.paired {
         println!("{}", paired.words());
     }

@@ -1,10 +1,11 @@
 //! One measurement: the run's own loops and bridge, a host, a load, and two threads that watch the machine.
 
 use crate::collect::{LoopTiming, Plan};
-use crate::gaps::{self, GapReport};
+use crate::gaps::{self, GapReport, Look, SPIN_NS};
 use crate::host::{Host, HostError, HostReport, Script};
 use crate::load::{Load, LoadError, Running};
 use crate::machine::Machine;
+use crate::noise::{self, Noise};
 use crate::others::{self, Others};
 use crate::paired::{self, Paired};
 use crate::sample::WARM_UP_S;
@@ -50,10 +51,12 @@ pub struct Setup<'a> {
     pub toggle: Option<Pin>,
     /// A witness keeps watch beside the force loop.
     pub witness: bool,
+    /// The force loop's core is watched before the loop starts.
+    pub noise: bool,
 }
 
 impl<'a> Setup<'a> {
-    /// Makes a run without trace, checkpoints, pin and witness.
+    /// Makes a run without trace, checkpoints, pin, witness and noise pass.
     pub fn new(options: &'a Options, duration_ns: u64, load: Load, folder: &'a Path) -> Self {
         Self {
             options,
@@ -64,6 +67,7 @@ impl<'a> Setup<'a> {
             checkpoints: None,
             toggle: None,
             witness: false,
+            noise: false,
         }
     }
 }
@@ -111,6 +115,7 @@ pub struct Measured {
     pub second: Option<LoopTiming>,
     pub host: HostReport,
     pub gaps: GapReport,
+    pub noise: Option<Noise>,
     pub cores: Vec<CoreWatch>,
     pub others: Others,
     pub paired: Option<Paired>,
@@ -181,6 +186,9 @@ fn watch_core(options: &Options) -> Option<usize> {
 /// Runs for `setup.duration_ns` after the first tick that a host saw, or until `interrupted`.
 pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, MeasureError> {
     process::limits::check().map_err(RunError::from)?;
+    let machine = Machine::this();
+    let pass = || noise::pass(&machine, setup.options, setup.duration_ns, interrupted).ok_or(MeasureError::Panicked);
+    let noise = setup.noise.then(pass).transpose()?;
     let began_s = jiff::Timestamp::now().as_second().max(0) as u64;
     let script = Script::of(&Scene::builtin(&setup.options.scene)?);
     let pose_times = Arc::new(PoseTimes::default());
@@ -208,7 +216,6 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         let plan = plan(second.period_ns, setup.duration_ns, window_ns);
         (LoopTiming::new(SECOND_STAGES, plan), ring)
     });
-    let machine = Machine::this();
     let priority = (!options.no_rt).then(|| {
         options
             .tissue_priority
@@ -265,7 +272,15 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         let tissue = threads.spawn(move || gathered(tissue, tissue_ring, "tissue"));
         // A campaign keeps the two loops present in every run.
         let second = second.map(|(timing, ring)| threads.spawn(move || timing.gather(ring)));
-        let gaps = threads.spawn(move || gaps::watch(core, priority, stop));
+        let gaps = threads.spawn(move || {
+            let look = Look {
+                core,
+                priority,
+                spin_ns: SPIN_NS,
+            };
+            // SYNC: nothing but the flag is carried.
+            gaps::watch(look, || stop.load(Ordering::Acquire))
+        });
         let machine = &machine;
         let looked_at = others::Watched {
             core: options.haptic_core,
@@ -320,6 +335,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         second: second.transpose().map_err(panicked)?,
         host: host.map_err(panicked)??,
         gaps: gaps.map_err(panicked)?,
+        noise,
         cores,
         others: others.map_err(panicked)?,
         paired: paired.transpose().map_err(panicked)?.flatten(),

@@ -99,7 +99,7 @@ impl Others {
         (2 * lasted_ns >= to_ns - from_ns).then(|| {
             let [ran, around] = [rival.ran_ns, rival.end_ns - rival.begin_ns].map(|ns| ns as f64 / 1e6);
             format!(
-                "{} ran {ran:.1} ms on this core, of the {around:.0} ms around the tick",
+                "{} ran {ran:.1} ms on this core, of the {around:.0} ms around",
                 rival.who
             )
         })

@@ -1,9 +1,13 @@
 //! The pictures of a report, as SVG.
 
+mod limits;
 mod maxima;
+mod osadl;
 mod trend;
 
+pub use limits::Limit;
 pub use maxima::{MaximaPart, maxima};
+pub use osadl::osadl;
 pub use trend::{TrendPoint, trend, trend_range_us};
 
 use crate::report::WindowRow;
@@ -11,7 +15,7 @@ use hdrhistogram::Histogram;
 use plotters::coord::ranged1d::{KeyPointHint, Ranged, ValueFormatter};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-pub use stylet_report::picture::{BLUE, DrawError, ORANGE};
+pub use stylet_report::picture::{BLUE, DrawError, INK, ORANGE};
 use stylet_report::picture::{Canvas, Drawn, axes, drawn, label};
 
 const SIZE: (u32, u32) = (560, 300);
@@ -92,6 +96,7 @@ pub struct Series<'a> {
     pub name: &'a str,
     pub color: RGBColor,
     pub histogram: &'a Histogram<u64>,
+    pub limits: Vec<Limit>,
 }
 
 /// Plots the histogram of the wake-up latency: linear microseconds, logarithmic count. The legend gives the number past
@@ -108,6 +113,9 @@ pub fn wake_histogram(series: &[Series]) -> Result<String, DrawError> {
         let top = counted.iter().flatten().copied().max().unwrap_or(1).max(1) as f64;
         let mut chart = chart(root, 58).build_cartesian_2d(0.0..right, Decades(0.5..decade_above(top), number))?;
         mesh(&mut chart, "wake-up latency, \u{b5}s", "ticks in a bin")?;
+        for s in series {
+            limits::lines(root, &mut chart, &s.limits, right, [0.5, decade_above(top)], s.color)?;
+        }
         for (s, counts) in series.iter().zip(&counted) {
             let style = s.color.mix(0.75).filled();
             chart.draw_series(counts.iter().enumerate().filter(|(_, n)| **n > 0).map(|(i, &n)| {
@@ -179,14 +187,15 @@ pub fn stages(rows: &[(String, Histogram<u64>)]) -> Result<String, DrawError> {
     })
 }
 
-/// Plots the worst wake-up and the longest tick of each window of the run.
-pub fn windows(windows: &[WindowRow], window_s: f64) -> Result<String, DrawError> {
+/// Plots the worst wake-up and the longest tick of each window of the run, the windows with missed deadlines, and the
+/// limit of the worst wake-up.
+pub fn windows(windows: &[WindowRow], window_s: f64, limit_us: f64) -> Result<String, DrawError> {
     picture(|root| {
         let right = windows.last().map_or(1.0, |w| w.at_s + window_s);
         let us = |us: f64| us.max(0.1);
         let all = || windows.iter().flat_map(|w| [us(w.worst_wake_us), us(w.worst_work_us)]);
         let low = all().fold(f64::MAX, f64::min).min(1.0).log10().floor();
-        let high = all().fold(1.0, f64::max);
+        let high = all().fold(limit_us.max(1.0), f64::max);
         let mut chart = chart(root, 58)
             // The legend has the highest decade to itself.
             .build_cartesian_2d(0.0..right, Decades(10_f64.powf(low)..10.0 * decade_above(high), number))?;
@@ -198,7 +207,17 @@ pub fn windows(windows: &[WindowRow], window_s: f64) -> Result<String, DrawError
             let line = windows.iter().map(|w| (w.at_s + window_s / 2.0, us(of(w))));
             chart.draw_series(LineSeries::new(line, color.stroke_width(1)))?;
         }
-        legend(root, &[("wake-up".to_owned(), BLUE), ("whole tick".to_owned(), ORANGE)])
+        limits::level(root, &mut chart, limit_us, right, BLUE)?;
+        let missed = windows.iter().filter(|w| w.missed > 0);
+        let place = |w: &WindowRow| (w.at_s + window_s / 2.0, us(w.worst_wake_us));
+        chart.draw_series(missed.map(|w| Cross::new(place(w), 4, INK.stroke_width(2))))?;
+        let count: u64 = windows.iter().map(|w| u64::from(w.missed)).sum();
+        let entries = [
+            ("wake-up".to_owned(), BLUE),
+            ("whole tick".to_owned(), ORANGE),
+            (format!("\u{d7} missed deadlines: {count}"), INK),
+        ];
+        legend(root, &entries)
     })
 }
 
@@ -206,6 +225,8 @@ pub fn windows(windows: &[WindowRow], window_s: f64) -> Result<String, DrawError
 pub fn tail(series: &[Series]) -> Result<String, DrawError> {
     picture(|root| {
         let longest = series.iter().map(|s| s.histogram.max()).max().unwrap_or(1) as f64 / 1e3;
+        let limits = series.iter().flat_map(|s| &s.limits).map(|limit| limit.us);
+        let longest = limits.fold(longest, f64::max);
         let shortest = series.iter().map(|s| s.histogram.min()).min().unwrap_or(0) as f64 / 1e3;
         let left = 10_f64.powi(shortest.max(0.1).log10().floor() as i32);
         let most = series.iter().map(|s| s.histogram.len()).max().unwrap_or(1).max(10) as f64;
@@ -216,6 +237,7 @@ pub fn tail(series: &[Series]) -> Result<String, DrawError> {
         )?;
         mesh(&mut chart, "microseconds", "share of ticks above")?;
         for s in series {
+            limits::gates(root, &mut chart, &s.limits, least, s.color)?;
             chart.draw_series(LineSeries::new(above(s.histogram), s.color.stroke_width(2)))?;
         }
         let entries: Vec<_> = series.iter().map(|s| (s.name.to_owned(), s.color)).collect();

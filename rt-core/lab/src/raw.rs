@@ -3,6 +3,7 @@
 
 use crate::compare::Comparison;
 use crate::measure::Measured;
+use crate::noise;
 use crate::paired::{BOTH, LOOP_ALONE, WITNESS};
 use crate::sample::{PARTS, histogram};
 use base64::Engine;
@@ -81,6 +82,10 @@ impl Raw {
         }
         all.push(("gap_watch/gaps".to_owned(), measured.gaps.gaps.clone()));
         all.push(("gap_watch/wake".to_owned(), measured.gaps.wake.clone()));
+        if let Some(noise) = &measured.noise {
+            all.push((noise::GAPS.to_owned(), noise.seen.gaps.clone()));
+            all.push((noise::SWITCHED.to_owned(), noise.seen.switched.clone()));
+        }
         if let Some(comparison) = comparison {
             all.push(("comparison/ours".to_owned(), comparison.ours.clone()));
             all.push(("comparison/other".to_owned(), comparison.others.clone()));

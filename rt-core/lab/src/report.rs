@@ -10,6 +10,7 @@ pub use derive::{contradictions, derive, limits_of};
 use crate::bound::MissBound;
 use crate::compare::Comparison;
 use crate::load::Load;
+use crate::noise::NoiseSection;
 use crate::others::Others;
 use crate::paired_section::PairedSection;
 use crate::provenance::{Fact, ProgramDigest, Setting};
@@ -30,6 +31,12 @@ pub const JSON: &str = "report.json";
 pub const PAGE: &str = "report.html";
 pub const HISTOGRAMS: &str = "histograms.hlog";
 pub const WAKES: &str = "wakes.txt";
+/// Files that are computed from the others.
+pub const CYCLICTEST: &str = "cyclictest.json";
+pub const OSADL: &str = "osadl.svg";
+/// Every file of a report but the report, in the order in which it lists them.
+pub const FILES: [&str; 5] = [HISTOGRAMS, WAKES, CYCLICTEST, OSADL, PAGE];
+
 /// File in the report's folder, with the digest that `sha256sum` prints.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FileDigest {
@@ -168,6 +175,9 @@ pub struct Report {
     pub parts: Vec<Summary>,
     pub stationarity: Stationarity,
     pub gaps: GapSection,
+    /// The force loop's core before the loop started.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<NoiseSection>,
     pub cores: Vec<CoreWatch>,
     pub others: Others,
     /// Whose the late wake-ups are, if a witness was asked for.

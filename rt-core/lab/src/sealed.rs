@@ -75,11 +75,11 @@ pub fn lines(json: &str, said: &str, computed: &str) -> Vec<String> {
     found
 }
 
-/// Characters that are shown around the first difference of a page.
+/// Characters that are shown around the first difference of a file.
 const SHOWN: usize = 60;
 
-/// Returns the first difference of a page.
-pub fn other_page(name: &str, said: &str, computed: &str) -> Option<String> {
+/// Returns the first difference of a file that is computed again.
+pub fn other_text(name: &str, said: &str, computed: &str) -> Option<String> {
     let at = said.bytes().zip(computed.bytes()).position(|(a, b)| a != b);
     let at = at.or((said.len() != computed.len()).then(|| said.len().min(computed.len())))?;
     let line = 1 + said.bytes().take(at).filter(|b| *b == b'\n').count();

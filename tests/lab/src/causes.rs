@@ -34,8 +34,13 @@ fn start(out: &Path, seconds: u32, over_us: u64) -> Child {
         .expect("rt-core starts")
 }
 
-/// Returns the measurement, once its force loop runs.
-fn target(child: &Child) -> Target {
+/// Name of the force loop's thread.
+const FORCE: &str = "haptic";
+/// Name of the thread that watches its core before it starts.
+const NOISE: &str = "noise";
+
+/// Returns the measurement, once a thread of that name runs on the force loop's core.
+fn target(child: &Child, name: &str) -> Target {
     let process = child.id() as i32;
     let begin = Instant::now();
     while begin.elapsed() < Duration::from_secs(20) {
@@ -44,8 +49,8 @@ fn target(child: &Child) -> Target {
             .flatten()
             .flatten()
         {
-            let name = std::fs::read_to_string(task.path().join("comm")).unwrap_or_default();
-            if name.trim() == "haptic" {
+            let found = std::fs::read_to_string(task.path().join("comm")).unwrap_or_default();
+            if found.trim() == name {
                 let thread = task.file_name().to_string_lossy().parse().expect("a number");
                 let status = std::fs::read_to_string(task.path().join("status")).unwrap_or_default();
                 let core = status
@@ -58,7 +63,7 @@ fn target(child: &Child) -> Target {
         }
         std::thread::sleep(Duration::from_millis(20));
     }
-    panic!("the force loop did not start");
+    panic!("no thread {name} started");
 }
 
 fn outliers(out: &Path) -> Vec<Value> {
@@ -90,7 +95,7 @@ fn instances_left(process: i32) -> bool {
 fn run(injection: &Injection) -> Result<(bool, String), String> {
     let out = folder(injection.name);
     let mut child = start(&out, 4, injection.over_us);
-    let target = target(&child);
+    let target = target(&child, FORCE);
     std::thread::sleep(Duration::from_millis(1_200));
     let injected = (injection.run)(target, Instant::now() + Duration::from_millis(2_500));
     child.wait().expect("ours");
@@ -163,8 +168,8 @@ fn eight_of_ten_injected_causes_are_named() {
     assert!(named >= AT_LEAST, "{named} of {} were named", ALL.len());
 }
 
-/// Measures without a trace; returns time and cause of each of the latest wake-ups.
-fn untraced(name: &str, inject: Option<&Injection>) -> Vec<(f64, String)> {
+/// Measures without a trace, and injects while a thread of that name is on the force loop's core; returns the report.
+fn untraced(name: &str, thread: &str, inject: Option<&Injection>) -> Value {
     let out = folder(name);
     let mut child = Command::new(program("rt-core"))
         .args(["latency", "--duration", "5s", "--out"])
@@ -172,34 +177,55 @@ fn untraced(name: &str, inject: Option<&Injection>) -> Vec<(f64, String)> {
         .stdout(Stdio::null())
         .spawn()
         .expect("rt-core starts");
-    let target = target(&child);
-    std::thread::sleep(Duration::from_millis(1_500));
+    let target = target(&child, thread);
+    let [after_ms, for_ms] = if thread == NOISE { [0, 1_800] } else { [1_500, 3_000] };
+    std::thread::sleep(Duration::from_millis(after_ms));
     if let Some(injection) = inject {
-        (injection.run)(target, Instant::now() + Duration::from_millis(3_000)).expect("root is all that it needs");
+        (injection.run)(target, Instant::now() + Duration::from_millis(for_ms)).expect("root is all that it needs");
     }
     child.wait().expect("ours");
     let text = std::fs::read_to_string(out.join("report.json")).expect("rt-core wrote its report");
-    let report: Value = serde_json::from_str(&text).expect("the report is JSON");
+    serde_json::from_str(&text).expect("the report is JSON")
+}
+
+/// Returns the causes of the latest wake-ups within the injection, which begins a second after the warm-up.
+fn causes(report: &Value) -> Vec<String> {
     let late = report["latest_wake_ups"].as_array().expect("a list");
     let read = |l: &Value| Some((l["at_s"].as_f64()?, l["cause"].as_str()?.to_owned()));
-    // Within the injection, which begins a second after the warm-up.
-    late.iter()
+    let within = late
+        .iter()
         .filter_map(read)
-        .filter(|(at_s, _)| (1.3..3.7).contains(at_s))
-        .collect()
+        .filter(|(at_s, _)| (1.3..3.7).contains(at_s));
+    within.map(|(_, cause)| cause).collect()
 }
 
 /// `make causes`.
 #[test]
 #[ignore = "depends on what else the machine does; run by `make causes`"]
 fn a_thread_of_higher_priority_is_named_without_a_trace() {
-    let is_named = |(_, cause): &&(f64, String)| cause.contains("of real-time priority");
-    let quiet = untraced("quiet", None);
-    assert_eq!(quiet.iter().filter(is_named).count(), 0, "{quiet:?}");
-    let disturbed = untraced("rival", Some(&ALL[0]));
+    let is_named = |cause: &&String| cause.contains("of real-time priority");
+    let quiet = untraced("quiet", FORCE, None);
+    assert_eq!(causes(&quiet).iter().filter(is_named).count(), 0, "{quiet}");
+    let disturbed = causes(&untraced("rival", FORCE, Some(&ALL[0])));
     let named = disturbed.iter().filter(is_named).count();
     println!("{named} of {} named: {:?}", disturbed.len(), disturbed.first());
     assert!(10 * named >= 9 * disturbed.len(), "{disturbed:?}");
+    // The same on the core before the loop starts.
+    let is_named = |gap: &&Value| {
+        gap["cause"]
+            .as_str()
+            .is_some_and(|cause| cause.starts_with("inj-higher"))
+    };
+    let named = |report: &Value| {
+        let gaps = report["noise"]["longest"].as_array().expect("a list");
+        (gaps.iter().filter(is_named).count(), gaps.len())
+    };
+    assert_eq!(named(&quiet).0, 0, "{quiet}");
+    let noisy = untraced("noise", NOISE, Some(&ALL[0]));
+    println!("{:?} gaps named: {}", named(&noisy), noisy["noise"]["longest"][0]);
+    assert!(named(&noisy).0 >= 4, "{}", noisy["noise"]);
+    let longest_us = noisy["noise"]["worst_switched_us"].as_f64();
+    assert!(longest_us > Some(1_300.0), "{}", noisy["noise"]);
 }
 
 /// Measures for five seconds without a trace while `beside` runs; returns what else ran, and the process number of
@@ -263,7 +289,7 @@ fn a_killed_measurement_leaves_no_trace_instance() {
     }
     let out = folder("killed");
     let mut child = start(&out, 20, 1_000);
-    let target = target(&child);
+    let target = target(&child, FORCE);
     let keeper = format!("trace-keeper\0stylet-{}", target.process);
     let is_kept = || {
         let all = std::fs::read_dir("/proc").into_iter().flatten().flatten();

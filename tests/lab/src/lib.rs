@@ -1,5 +1,5 @@
-//! The latency laboratory as a user runs it: causes that are injected into a measurement, and campaigns that are
-//! killed.
+//! The latency laboratory as a user runs it: causes that are injected into a measurement, campaigns that are killed,
+//! and files for other programs.
 
 #[cfg(test)]
 mod campaign;
@@ -7,6 +7,8 @@ mod campaign;
 mod causes;
 #[cfg(test)]
 mod inject;
+#[cfg(test)]
+mod interchange;
 
 /// Removes the files of a killed process from shared memory.
 #[cfg(test)]

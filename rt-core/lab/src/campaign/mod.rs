@@ -248,7 +248,7 @@ fn again(folder: &Path, text: &str, problems: &mut Vec<String>) -> Result<(), Ca
     problems.extend(sealed::lines(REPORT, text, &text_of(&again)?).into_iter().take(NAMED));
     if again.about.commit == COMMIT {
         let page = disk::read_text(&folder.join(PAGE))?;
-        problems.extend(sealed::other_page(PAGE, &page, &page::page(&again)?));
+        problems.extend(sealed::other_text(PAGE, &page, &page::page(&again)?));
     }
     Ok(())
 }

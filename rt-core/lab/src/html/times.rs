@@ -1,6 +1,7 @@
 //! Durations: loops, host, comparison, latest wake-ups.
 
 use crate::compare::Against;
+use crate::noise::NoiseGap;
 use crate::report::{LoopSection, Report};
 use crate::summary::{QUANTILES, Quantile, Summary};
 use maud::{Markup, html};
@@ -139,6 +140,26 @@ pub fn late(r: &Report) -> Markup {
         (table(&head, &rows, &columns))
         @if r.trace.is_none() {
             p class="faint" { "With " code { "--trace" } " a trace of the kernel names the cause of each." }
+        }
+    }
+}
+
+/// Tabulates what took the loop's core before the loop started.
+pub fn noise(r: &Report) -> Markup {
+    let Some(n) = &r.noise else {
+        return Markup::default();
+    };
+    let row = |gap: &NoiseGap| vec![cell(format!("{:.3}", gap.at_s)), count(gap.us), cell(micro(&gap.cause))];
+    let rows: Vec<Vec<Markup>> = n.longest.iter().map(row).collect();
+    html! {
+        h2 { "The loop's core before the loop started" }
+        @if !rows.is_empty() {
+            (table(&["at, s", "gap, \u{b5}s", "cause"], &rows, &[Column::Number, Column::Number, Column::Wide]))
+        }
+        p { (micro(&n.words())) "." }
+        p class="faint" {
+            "A thread of the loop's priority spun there without a load and read the clock. No change of the loop avoids these \
+             gaps."
         }
     }
 }

@@ -11,6 +11,7 @@ use crate::gaps::GapReport;
 use crate::load::Load;
 use crate::machine::Machine;
 use crate::measure::{Measured, counts};
+use crate::noise::NoiseSection;
 use crate::paired_section::PairedSection;
 use crate::provenance;
 use crate::raw::Raw;
@@ -104,6 +105,7 @@ pub fn report(parts: &Parts, raw: &Raw) -> Report {
             worst_us: None,
             wake: summary("", &measured.gaps.wake, &[], 1e3),
         },
+        noise: measured.noise.as_ref().map(NoiseSection::of),
         cores: measured.cores.clone(),
         others: measured.others.clone(),
         paired: measured.paired.as_ref().map(|_| PairedSection::of(raw, period_ns)),

@@ -53,6 +53,9 @@ pub fn derive(r: &mut Report, raw: &Raw, limits: &Limits) {
         wake: summary("wake-up of the gap watch", &raw.get("gap_watch/wake"), &[], 1e3),
         ..r.gaps.clone()
     };
+    if let Some(noise) = &mut r.noise {
+        noise.derive(raw);
+    }
     if let Some(comparison) = &mut r.comparison {
         comparison.set_ratios();
     }
@@ -259,6 +262,8 @@ pub fn contradictions(r: &Report, raw: &Raw) -> Vec<String> {
             format!("paired: {sorted} late wake-ups of {late} ns, the histogram of wake-ups has fewer"),
         );
     }
+    let noise = r.noise.as_ref().and_then(|noise| noise.contradiction(raw));
+    must(noise.is_none(), noise.unwrap_or_default());
     let c = &r.haptic.counts;
     let parts = raw.parts("haptic/wake");
     let grid_of_part = ((r.protocol.duration_s * r.protocol.rate_hz).round() as u64)

@@ -13,7 +13,7 @@ use crate::measure::Measured;
 use crate::others::Others;
 use crate::paired::Paired;
 use crate::raw::Raw;
-use crate::report::{HISTOGRAMS, PAGE, Parts, WAKES, report};
+use crate::report::{FILES, HISTOGRAMS, PAGE, Parts, WAKES, report};
 use crate::sample::{Batched, histogram};
 use crate::sealed::NO_DIGEST;
 use crate::verdict;
@@ -90,10 +90,13 @@ fn genuine(root: &Path, seed: u64) -> PathBuf {
             core: Some(1),
             watched_ns: 240_000_000,
             gaps: histogram(),
+            switched: histogram(),
             wake: histogram(),
             found: Vec::new(),
+            found_switched: Vec::new(),
             late: Vec::new(),
         },
+        noise: None,
         cores: Vec::new(),
         others: Others::default(),
         paired: Some(paired),
@@ -243,14 +246,14 @@ fn forge(kind: &str, forged: &Forged, i: usize, other: &Path) {
                 _ => log.replace(lines[at], &format!("{0}\n{0}", lines[at])),
             }
         }),
-        "page" => forged.change(PAGE, |page| {
-            let places: Vec<usize> = page
-                .match_indices("</td>")
+        "computed" => forged.change(FILES[2 + i % 3], |text| {
+            let places: Vec<usize> = text
+                .match_indices(['<', ',', '"'])
                 .map(|(at, _)| at)
-                .filter(|&at| page.as_bytes()[at - 1].is_ascii_digit())
+                .filter(|&at| at > 0 && text.as_bytes()[at - 1].is_ascii_digit())
                 .collect();
             let at = places[i * places.len() / 10];
-            format!("{}{}", other_digit(&page[..at]), &page[at..])
+            format!("{}{}", other_digit(&text[..at]), &text[at..])
         }),
         "order" => match i % 3 {
             0 => forged.change(WAKES, |wakes| swap_lines(&wakes, 100 + i, 700)),
@@ -320,7 +323,15 @@ fn ninety_forgeries_are_named_and_no_genuine_report_is() {
         if i >= 10 {
             continue;
         }
-        for kind in ["values", "outcomes", "histograms", "page", "order", "dates", "names"] {
+        for kind in [
+            "values",
+            "outcomes",
+            "histograms",
+            "computed",
+            "order",
+            "dates",
+            "names",
+        ] {
             let forged = Forged::of(folder, &format!("{kind}-{i}"));
             forge(kind, &forged, i, &all[(i + 1) % 10]);
             let found = forged.problems(None);
