@@ -7,7 +7,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 use stylet_controllers as controller;
 use stylet_files::dicom::Shared;
 use stylet_files::together;
-use stylet_host::record;
+use stylet_host::{health, record};
 use stylet_implant::procedure;
 use stylet_manual::{ManualArgs, Product};
 use stylet_shm_schema::Instance;
@@ -63,6 +63,9 @@ enum Task {
     /// Record every tick of the force loop and the tissue's snapshots in an MCAP file, and count
     /// losses
     Record(record::Options),
+    /// Say how many ticks of a running core succeed, of the last 100 and of all watched ones, also for a monitoring
+    /// system; a tick succeeds if its force leaves within its period
+    Health(health::Options),
     /// Convert a recording into a table, or into a motion for rt-core's replay device
     Export(record::Export),
     /// Let rt-core write its flight recording: the last seconds of both loops, for 'rt-core replay'
@@ -104,6 +107,11 @@ impl Cli {
             Some(Task::Controllers) => Ok(controller::list()?),
             Some(Task::Record(options)) => {
                 let ended = record::run(&options);
+                options.instance.sweep();
+                Ok(ended?)
+            }
+            Some(Task::Health(options)) => {
+                let ended = health::run(&options);
                 options.instance.sweep();
                 Ok(ended?)
             }

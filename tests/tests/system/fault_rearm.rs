@@ -15,6 +15,20 @@ fn a_procedure_does_not_begin_while_a_fault_stands_unless_it_may_rearm() {
         let mut core = Core::start();
         let mut link = core.host();
         ask(&mut link, &Request::Engage).expect("armed");
+        let out = scratch(&format!("rearm-{}", core.instance.name()));
+        let figures = out.join("health.prom");
+        let mut health = Command::new(program("host-ui"))
+            .args(["health", "--instance", core.instance.name(), "--openmetrics"])
+            .arg(&figures)
+            .spawn()
+            .expect("host-ui starts");
+        // Of a counter or a gauge; 0 before the file is there.
+        let figure = |name: &str| -> f64 {
+            let text = std::fs::read_to_string(&figures).unwrap_or_default();
+            let line = text.lines().find(|l| l.starts_with(name));
+            line.and_then(|l| l.rsplit(' ').next()?.parse().ok()).unwrap_or(0.0)
+        };
+        assert!(until(LONG, || figure("stylet_ticks_total") > 0.0));
         let stopped = StoppedThread::stop(core.id(), "tissue");
         let fault = Fault::TissueStale as u32;
         let mut fault_is = |fault: u32| {
@@ -25,7 +39,6 @@ fn a_procedure_does_not_begin_while_a_fault_stands_unless_it_may_rearm() {
         };
         assert!(fault_is(fault));
         drop(stopped);
-        let out = scratch(&format!("rearm-{}", core.instance.name()));
         let procedure = |name: &str| {
             let mut command = Command::new(program("host-ui"));
             command.args(["procedure", "--instance", core.instance.name(), "--out"]);
@@ -42,8 +55,26 @@ fn a_procedure_does_not_begin_while_a_fault_stands_unless_it_may_rearm() {
         assert!(fault_is(fault), "it re-armed by itself");
         let mut allowed = procedure("allowed").arg("--rearm").spawn().expect("host-ui starts");
         let armed = fault_is(0);
+        let counted = until(LONG, || figure("stylet_rearms_total") == 1.0);
+        let (ticks, faults, all) = (
+            figure("stylet_ticks_total"),
+            figure("stylet_faults_total"),
+            figure("stylet_tick_success_ratio"),
+        );
+        let goes_on = until(LONG, || figure("stylet_ticks_total") > ticks + 500.0);
+        health.kill().expect("ours");
+        health.wait().expect("ours");
         allowed.kill().expect("ours");
         allowed.wait().expect("ours");
         assert!(armed, "--rearm is the word for it");
+        assert!(
+            counted && goes_on,
+            "{}",
+            std::fs::read_to_string(&figures).unwrap_or_default()
+        );
+        assert!(
+            faults == 1.0 && ticks > 500.0 && all > 0.0,
+            "{faults} faults, {ticks} ticks, success {all}"
+        );
     });
 }
