@@ -137,7 +137,7 @@ impl NoiseSection {
         let core = self.core.map_or("any core".to_owned(), |core| format!("core {core}"));
         let worst = |us: Option<f64>| us.map_or(String::new(), |us| format!(", the longest {us:.0} us"));
         format!(
-            "noise before the loop started: {:.1} s watched on {core}: {} gaps over 20 us without a switch{}; {} in which \
+            "Noise before the loop started: {:.1} s watched on {core}: {} gaps over 20 us without a switch{}; {} in which \
              another thread had the core{}",
             self.watched_s,
             self.gaps,

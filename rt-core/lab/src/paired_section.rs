@@ -43,7 +43,7 @@ impl PairedSection {
     pub fn words(&self) -> String {
         let latest = |s: &Summary| s.max_us.map_or(String::new(), |us| format!(" (latest {us:.0} us)"));
         format!(
-            "wake-ups later than {:.0} us: {} of the loop alone{}, {} also of a witness on its core{}, {} unwatched",
+            "Wake-ups later than {:.0} us: {} of the loop alone{}, {} also of a witness on its core{}, {} unwatched",
             self.late_from_us,
             self.loop_alone.count,
             latest(&self.loop_alone),

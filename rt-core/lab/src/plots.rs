@@ -111,10 +111,12 @@ pub fn wake_histogram(series: &[Series]) -> Result<String, DrawError> {
         let right = bin_us * 100.0;
         let counted: Vec<Vec<u64>> = series.iter().map(|s| bins(s.histogram, bin_us, 100)).collect();
         let top = counted.iter().flatten().copied().max().unwrap_or(1).max(1) as f64;
-        let mut chart = chart(root, 58).build_cartesian_2d(0.0..right, Decades(0.5..decade_above(top), number))?;
+        let high = decade_above(top);
+        // Legend and names of limits have the highest decade to themselves.
+        let mut chart = chart(root, 58).build_cartesian_2d(0.0..right, Decades(0.5..10.0 * high, number))?;
         mesh(&mut chart, "wake-up latency, \u{b5}s", "ticks in a bin")?;
         for s in series {
-            limits::lines(root, &mut chart, &s.limits, right, [0.5, decade_above(top)], s.color)?;
+            limits::lines(root, &mut chart, &s.limits, right, [0.5, 4.0 * high], s.color)?;
         }
         for (s, counts) in series.iter().zip(&counted) {
             let style = s.color.mix(0.75).filled();

@@ -37,10 +37,12 @@ pub fn lines<X: Ranged<ValueType = f64>>(
     [bottom, top]: [f64; 2],
     color: RGBColor,
 ) -> Drawn {
-    for limit in limits.iter().filter(|limit| limit.us <= right_us) {
+    let in_range = limits.iter().filter(|limit| limit.us <= right_us);
+    for (limit, row) in in_range.zip(0..) {
         dashed(chart, [(limit.us, bottom), (limit.us, top)], color)?;
         let (x, y) = chart.backend_coord(&(limit.us, top));
-        name(root, limit, (x + 3, y + 6), color)?;
+        // Names of limits close together are below each other.
+        name(root, limit, (x + 4, y + 6 + 13 * row), color)?;
     }
     Ok(())
 }
@@ -53,11 +55,14 @@ pub fn gates<X: Ranged<ValueType = f64>>(
     least: f64,
     color: RGBColor,
 ) -> Drawn {
-    for limit in limits {
+    // Of limits of one time the strictest holds.
+    let is_strictest = |limit: &&Limit| !limits.iter().any(|o| o.us == limit.us && o.share < limit.share);
+    for limit in limits.iter().filter(is_strictest) {
         let low = limit.share.max(least);
         dashed(chart, [(limit.us, low), (limit.us, 1.0)], color)?;
         let (x, y) = chart.backend_coord(&(limit.us, low));
-        name(root, limit, (x + 3, y - 6), color)?;
+        let below = if limit.share > least { 6 } else { -6 };
+        name(root, limit, (x + 4, y + below), color)?;
     }
     Ok(())
 }

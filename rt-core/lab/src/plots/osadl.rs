@@ -4,7 +4,7 @@ use super::limits::{Limit, lines};
 use super::{Decades, chart, decade_above, legend, mesh, number};
 use crate::cyclictest::CoreWakes;
 use plotters::prelude::*;
-use stylet_report::picture::{BLUE, COLOURS, DrawError, INK, drawn};
+use stylet_report::picture::{BLUE, COLOURS, DrawError, drawn};
 
 const SIZE: (u32, u32) = (1_120, 360);
 /// Below one sample, so that a bin with one is seen.
@@ -27,7 +27,7 @@ pub fn osadl(cores: &[CoreWakes], limits: &[Limit], missed: u64) -> Result<Strin
         let mut chart = chart(root, 70).build_cartesian_2d(0.0..right, Decades(FLOOR..top, number))?;
         let x = format!("latency, \u{b5}s; largest {longest_us} \u{b5}s");
         mesh(&mut chart, &x, "number of latency samples")?;
-        lines(root, &mut chart, limits, right, [FLOOR, top / 10.0], BLUE)?;
+        lines(root, &mut chart, limits, right, [FLOOR, 0.4 * top], BLUE)?;
         let colours = [BLUE].into_iter().chain(COLOURS.into_iter().filter(|c| *c != BLUE));
         let colours: Vec<RGBColor> = colours.collect();
         for (color, bins) in colours.iter().zip(&bins).rev() {
@@ -35,13 +35,13 @@ pub fn osadl(cores: &[CoreWakes], limits: &[Limit], missed: u64) -> Result<Strin
         }
         let words = |(of, color): (&CoreWakes, &RGBColor)| {
             let core = of.core.map_or("any core".to_owned(), |core| format!("core {core}"));
-            (
-                format!("{core}: {}, largest {} \u{b5}s", of.thread, of.wakes.max() / 1_000),
-                *color,
-            )
+            let largest_us = of.wakes.max() / 1_000;
+            (format!("{core}: {}, largest {largest_us} \u{b5}s", of.thread), *color)
         };
         let mut entries: Vec<_> = cores.iter().zip(&colours).map(words).collect();
-        entries.push((format!("missed deadlines of the force loop: {missed}"), INK));
+        if let Some((force, _)) = entries.first_mut() {
+            *force += &format!(", missed deadlines: {missed}");
+        }
         legend(root, &entries)
     })
 }
