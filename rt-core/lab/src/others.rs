@@ -115,6 +115,8 @@ pub struct Watched {
     /// Name of its thread.
     pub thread: &'static str,
     pub from_core: Option<usize>,
+    /// Every other thread comes first, as the loops may need what this look costs.
+    pub gives_way: bool,
 }
 
 /// The state of the PC before a measurement.
@@ -133,13 +135,15 @@ pub fn before(machine: &Machine) -> Before {
     }
 }
 
-/// Looks on until `stop`, whenever no other thread needs the core.
+/// Looks on until `stop`.
 pub fn watch(machine: &Machine, watched: Watched, before: Before, stop: &AtomicBool) -> (Before, Others) {
     let _armed = arm::arm(Ask {
         priority: None,
         core: watched.from_core,
     });
-    arm::give_way();
+    if watched.gives_way {
+        arm::give_way();
+    }
     let mut others = Others {
         moments: vec![before.moment.clone()],
         ..Others::default()

@@ -210,7 +210,12 @@ fn a_thread_of_higher_priority_is_named_without_a_trace() {
     let named = disturbed.iter().filter(is_named).count();
     println!("{named} of {} named: {:?}", disturbed.len(), disturbed.first());
     assert!(10 * named >= 9 * disturbed.len(), "{disturbed:?}");
-    // The same on the core before the loop starts.
+}
+
+/// `make causes`.
+#[test]
+#[ignore = "depends on what else the machine does; run by `make causes`"]
+fn noise_of_a_thread_of_higher_priority_is_named_without_a_trace() {
     let is_named = |gap: &&Value| {
         gap["cause"]
             .as_str()
@@ -220,7 +225,8 @@ fn a_thread_of_higher_priority_is_named_without_a_trace() {
         let gaps = report["noise"]["longest"].as_array().expect("a list");
         (gaps.iter().filter(is_named).count(), gaps.len())
     };
-    assert_eq!(named(&quiet).0, 0, "{quiet}");
+    let quiet = untraced("quiet-core", FORCE, None);
+    assert_eq!(named(&quiet).0, 0, "{}", quiet["noise"]);
     let noisy = untraced("noise", NOISE, Some(&ALL[0]));
     println!("{:?} gaps named: {}", named(&noisy), noisy["noise"]["longest"][0]);
     assert!(named(&noisy).0 >= 4, "{}", noisy["noise"]);
