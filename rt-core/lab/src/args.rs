@@ -2,7 +2,7 @@
 
 use crate::compare::Against;
 use crate::load::Load;
-use crate::machine::{Machine, Throttle};
+use crate::machine::{Machine, longest_spin_ns};
 use crate::measure;
 use crate::sample::LATE_SHARE;
 use crate::spin::Spin;
@@ -164,18 +164,6 @@ impl LatencyArgs {
     }
 }
 
-/// Fraction of a core kept free for the loop itself and for everything else of real-time priority.
-const SHARE_KEPT_FREE: f64 = 0.15;
-
-/// Returns the longest spin that leaves the core below the kernel's share for real-time threads.
-pub(crate) fn longest_spin_ns(period_ns: u64, throttle: Option<Throttle>) -> u64 {
-    let share = match throttle {
-        Some(Throttle::Share(share)) => share,
-        Some(Throttle::Off) | None => 0.95,
-    };
-    ((share - SHARE_KEPT_FREE).max(0.0) * period_ns as f64).round() as u64
-}
-
 /// An invalid duration.
 #[derive(Debug, thiserror::Error)]
 pub enum DurationError {
@@ -200,6 +188,7 @@ pub(crate) fn duration_ns(text: &str) -> Result<u64, DurationError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::Throttle;
 
     #[test]
     fn a_spin_leaves_the_kernel_its_share() {

@@ -27,6 +27,7 @@ pub mod load;
 mod machine;
 mod measure;
 mod noise;
+mod noise_section;
 mod others;
 mod paired;
 mod paired_section;

@@ -62,6 +62,18 @@ pub enum Throttle {
     Share(f64),
 }
 
+/// Fraction of a core kept free for the loop itself and for everything else of real-time priority.
+const SHARE_KEPT_FREE: f64 = 0.15;
+
+/// Returns the longest spin that leaves the core below the kernel's share for real-time threads.
+pub fn longest_spin_ns(period_ns: u64, throttle: Option<Throttle>) -> u64 {
+    let share = match throttle {
+        Some(Throttle::Share(share)) => share,
+        Some(Throttle::Off) | None => 0.95,
+    };
+    ((share - SHARE_KEPT_FREE).max(0.0) * period_ns as f64).round() as u64
+}
+
 impl Machine {
     /// Returns the machine that this program runs on.
     pub fn this() -> Self {

@@ -10,7 +10,7 @@ pub use derive::{contradictions, derive, limits_of};
 use crate::bound::MissBound;
 use crate::compare::Comparison;
 use crate::load::Load;
-use crate::noise::NoiseSection;
+use crate::noise_section::NoiseSection;
 use crate::others::Others;
 use crate::paired_section::PairedSection;
 use crate::provenance::{Fact, ProgramDigest, Setting};

@@ -1,8 +1,8 @@
 //! The file of a campaign, and its parts.
 
-use crate::args::{duration_ns, longest_spin_ns};
+use crate::args::duration_ns;
 use crate::load::Load;
-use crate::machine::Machine;
+use crate::machine::{Machine, longest_spin_ns};
 use crate::measure::period_ns;
 use crate::verdict::{self, LimitsError};
 use serde::{Deserialize, Deserializer, Serialize};

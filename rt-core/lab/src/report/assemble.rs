@@ -11,7 +11,7 @@ use crate::gaps::GapReport;
 use crate::load::Load;
 use crate::machine::Machine;
 use crate::measure::{Measured, counts};
-use crate::noise::NoiseSection;
+use crate::noise_section::NoiseSection;
 use crate::paired_section::PairedSection;
 use crate::provenance;
 use crate::raw::Raw;
