@@ -22,6 +22,7 @@ use standing::Standing;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use stylet_hw::{DeviceInfo, Hand};
+use stylet_procedure::tolerance::STALLED_M;
 use stylet_shm_schema::{
     MAX_LEFT_NEEDLES, MAX_SEEDS, NeedleAxis, NeedleRehearsal, ParameterProblems, ParameterSet, Reason, Refusal,
     RefusalCode, SeedPose, flags,
@@ -64,6 +65,9 @@ pub enum RehearseError {
     /// `stop` was set.
     #[error("rt-core ended during the rehearsal")]
     Stopped,
+    /// The script would take a hand that leans on bone for a tip at its place, and leave the seeds there.
+    #[error("bone stops the needle {0:.1} mm before its deepest drop")]
+    Bone(f64),
     /// A loop refused an order.
     #[error("{}", why.message())]
     Refused {
@@ -236,6 +240,9 @@ impl Stage {
         let scattered = Scatter::of(set).map(|scatter| scatter.apply(run));
         let run = scattered.as_ref().unwrap_or(run);
         let lines = self.lines(run, active.force.bending.is_on(), stop)?;
+        if let Some(in_bone_m) = lines.last().map(|line| in_bone_m(line, run)).filter(|m| *m > STALLED_M) {
+            return Err(RehearseError::Bone(1e3 * in_bone_m));
+        }
         if !run.stabilising.is_empty() && !run.earlier.is_empty() {
             return self.rehearse_after(run, set, &active, lines, stop);
         }
@@ -255,6 +262,16 @@ impl Stage {
         world.seeds_take_room = !run.as_points;
         Ok(Rig::new(world, active, (&self.device, self.hand), run))
     }
+}
+
+/// Returns how far the needle's deepest drop is behind bone.
+fn in_bone_m(line: &ReadyLine, run: &NeedleRehearsal) -> f64 {
+    let (way, _) = Script::way(run);
+    let each_m = way
+        .drops_m
+        .iter()
+        .map(|tip_m| line.hand.in_bone_m(line.hand.along_m(tip_m)));
+    each_m.fold(0.0, f64::max)
 }
 
 fn stopped(why: NoLine) -> RehearseError {

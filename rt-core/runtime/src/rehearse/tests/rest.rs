@@ -148,3 +148,29 @@ fn seeds_by_each_number() {
     }
     row("points, without a body", &points, &ParameterSet::default());
 }
+
+/// A scattered needle of a study met the arch 70 mm before its place. Its script went on, and its seeds lay there.
+#[test]
+fn a_needle_that_bone_stops_is_no_rehearsal() {
+    let mut bone = stylet_sim::scene::Structure::soft("bone", 2);
+    bone.material.fixed = true;
+    let labels = stylet_sim::scene::Labels {
+        dims: [20, 20, 30],
+        spacing_m: 2e-3,
+        cells: (0..20 * 20 * 30).map(|n| 1 + u8::from(n >= 20 * 20 * 20)).collect(),
+        structures: vec![stylet_sim::scene::Structure::soft("gland", 1), bone],
+    };
+    let source = SceneSource::of_labels("on bone", &labels);
+    let mut stage = Stage::build(&source, TissueKind::ChainMail, DeviceInfo::phantom_premium_1_5()).expect("valid");
+    let mut to = |deepest_m: f64| {
+        let run = NeedleRehearsal {
+            entry_m: [20e-3, 20e-3, -10e-3],
+            drops_m: vec![[20e-3, 20e-3, deepest_m], [20e-3, 20e-3, 20e-3]],
+            ..needle()
+        };
+        stage.rehearse(&run, &ParameterSet::default(), &AtomicBool::new(false))
+    };
+    // The tip is half a seed ahead, and bone begins at 40 mm.
+    assert!(matches!(to(45e-3), Err(RehearseError::Bone(mm)) if (mm - 7.25).abs() < 0.3));
+    assert!(to(35e-3).is_ok());
+}
