@@ -84,11 +84,11 @@ pub fn arm(ask: Ask) -> Result<Armed, Refused> {
     })
 }
 
-/// Lets the calling thread run only when no other one needs its core. Does nothing if the kernel refuses.
+/// Gives the calling thread a small share of a busy core. In the idle class it would get none, and name no cause of a
+/// late tick. Does nothing if the kernel refuses.
 pub fn give_way() {
-    let parameters = libc::sched_param { sched_priority: 0 };
-    // SAFETY: `parameters` is valid for reads; 0 names the calling thread.
-    unsafe { libc::sched_setscheduler(0, libc::SCHED_IDLE, &parameters) };
+    // SAFETY: no pointers; 0 names the calling thread.
+    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, 10) };
 }
 
 /// Keeps all threads on one heap that returns no memory. Call it before other threads exist: a thread keeps a heap it
