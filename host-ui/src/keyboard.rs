@@ -17,7 +17,7 @@ pub const KEYS: [(&str, &str); 26] = [
         "move the second hand, if rt-core has --device-2",
     ),
     ("B", "brake of the probe's stepper, with --device-2"),
-    ("Enter", "the main action of the present step"),
+    ("Enter", "the main action of the current step"),
     ("Space", "drop a seed at the tip"),
     (
         "Ctrl+Z",
@@ -254,7 +254,7 @@ mod tests {
     #[test]
     fn behind_a_question_only_the_force_goes_off() {
         let ctx = egui::Context::default();
-        let mut frame = |key: Key| {
+        let frame = |key: Key| {
             let event = Event::Key {
                 key,
                 physical_key: None,

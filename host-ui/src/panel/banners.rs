@@ -174,11 +174,11 @@ fn of_line(line: &Relayed) -> Banner {
 
 fn force_is_off(shown: &Shown) -> Option<Banner> {
     if !shown.is_engaged() {
-        let text = "Motion is tracked, but no force is rendered. Key E turns it on.";
+        let text = "The needle moves, but no force is felt. Key E turns it on.";
         let banner = Banner::new(BannerLevel::Warn, "The force is off", text);
         return Some(banner.with("Turn it on", Action::Send(Request::Engage)));
     }
-    let text = "It would start with a jump. Move the needle until the force is small, preferably outside the tissue.";
+    let text = "Turned on now, it would jolt the hand. Move the needle until the force is small, preferably outside the tissue.";
     shown
         .is_waiting()
         .then(|| Banner::new(BannerLevel::Warn, "The force is held back", text))

@@ -237,7 +237,7 @@ fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
             .explained("tick");
     });
     let text = format!(
-        "tissue: missed {}, worst work {}; lost in core {}; gate acted {}",
+        "tissue: missed {}, worst work {}; lost in core {}; force limited {}",
         format::count(s.tissue_missed_deadlines),
         format::microseconds(Some(format::us(s.worst_tissue_work_ns))),
         format::count(s.records_lost),

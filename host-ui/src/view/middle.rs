@@ -17,7 +17,6 @@ use crate::theme;
 use crate::theme::Press;
 use eframe::egui_wgpu::RenderState;
 use egui::{Pos2, Rect};
-use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_files::Image;
 use stylet_host::link::{SceneModel, Snapshot};

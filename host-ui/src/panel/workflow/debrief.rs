@@ -138,7 +138,7 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
     let touch = |number: &usize| !touching(&shown.seeds, *number).is_empty();
     let touching = (0..shown.seeds.len()).filter(touch).count();
     if touching > 0 {
-        ui.label(theme::small(format!("{touching} seeds touch another one")));
+        ui.label(theme::small(format!("{touching} seeds touch a neighbour")));
     }
     // The list is last and does not scroll by itself, so that the wheel moves the whole panel.
     ui.spacing_mut().interact_size.y = 16.0;
