@@ -11,8 +11,10 @@ const STEP_M: f64 = 0.75e-3;
 const MARGIN_M: f64 = 11e-3;
 /// Distance from the plane within which a seed is drawn, m: half its length.
 const SEED_REACH_M: f64 = 2.25e-3;
+/// Dashes and gaps of a line, pixels.
+type Dashes = (i32, i32);
 /// Drawn doses, as shares of the prescription, with their colours and dashes.
-const LEVELS: [(f64, RGBColor, Option<(i32, i32)>); 4] = [
+const LEVELS: [(f64, RGBColor, Option<Dashes>); 4] = [
     (0.5, BLUE, Some((2, 3))),
     (1.0, GREEN, None),
     (1.5, ORANGE, Some((6, 3))),

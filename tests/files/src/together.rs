@@ -62,7 +62,7 @@ const CLINICAL: [(&str, &str, Kind); 28] = [
 /// Options for one clinical file alone.
 const ALONE: [(&str, &str); 3] = [("find-seeds", "ct"), ("check", "file"), ("picture", "scene")];
 /// Options for files and folders that are of no patient: sources, results, recordings, studies.
-const OTHERS: [&str; 17] = [
+const OTHERS: [&str; 18] = [
     "class",
     "core",
     "csv",
@@ -73,6 +73,7 @@ const OTHERS: [&str; 17] = [
     "json",
     "motion",
     "motion_2",
+    "openmetrics",
     "out",
     "program",
     "recording",
