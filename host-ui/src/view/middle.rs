@@ -85,9 +85,9 @@ impl Middle {
         self.slices.take(&self.body, &mut self.view);
         if let (true, Some(tip_m), Some(scene)) = (self.view.follow_tip, shown.tip_m(), &shown.scene) {
             // A needle at its entry is in two of the planes; the third waits for it at the edge of the body.
-            for axis in 0..3 {
-                if near_body(scene, axis).contains(&tip_m[axis]) {
-                    self.view.cursor_m[axis] = tip_m[axis];
+            for (axis, place_m) in tip_m.into_iter().enumerate() {
+                if near_body(scene, axis).contains(&place_m) {
+                    self.view.cursor_m[axis] = place_m;
                 }
             }
         }
