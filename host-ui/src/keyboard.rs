@@ -187,6 +187,17 @@ mod tests {
     use super::*;
     use egui::{Event, RawInput};
 
+    /// Returns a key that goes down or up.
+    fn event(key: Key, pressed: bool) -> Event {
+        Event::Key {
+            key,
+            physical_key: None,
+            pressed,
+            repeat: false,
+            modifiers: Modifiers::NONE,
+        }
+    }
+
     fn read_after(ctx: &egui::Context, events: Vec<Event>) -> Keys {
         let mut keys = Keys::default();
         let input = RawInput {
@@ -227,16 +238,7 @@ mod tests {
             };
             vec![Event::PointerMoved(at.into()), button(true), button(false)]
         };
-        let e = || {
-            let key = |pressed| Event::Key {
-                key: Key::E,
-                physical_key: None,
-                pressed,
-                repeat: false,
-                modifiers: Modifiers::NONE,
-            };
-            vec![key(true), key(false)]
-        };
+        let e = || vec![event(Key::E, true), event(Key::E, false)];
         for _ in 0..3 {
             frame(Vec::new(), true);
         }
@@ -255,15 +257,8 @@ mod tests {
     fn behind_a_question_only_the_force_goes_off() {
         let ctx = egui::Context::default();
         let frame = |key: Key| {
-            let event = Event::Key {
-                key,
-                physical_key: None,
-                pressed: true,
-                repeat: false,
-                modifiers: Modifiers::NONE,
-            };
             let input = RawInput {
-                events: vec![event],
+                events: vec![event(key, true)],
                 ..RawInput::default()
             };
             let mut keys = Keys::default();
@@ -282,13 +277,7 @@ mod tests {
     #[test]
     fn releasing_alt_first_does_not_move_the_needle() {
         let ctx = egui::Context::default();
-        let w = |pressed| Event::Key {
-            key: Key::W,
-            physical_key: None,
-            pressed,
-            repeat: false,
-            modifiers: Modifiers::NONE,
-        };
+        let w = |pressed| event(Key::W, pressed);
         let alt = |modifiers| Event::ModifiersChanged(modifiers);
         let keys = read_after(&ctx, vec![alt(Modifiers::ALT), w(true)]);
         assert!(keys.second_m_per_s[2] > 0.0 && keys.drive_m_per_s == 0.0);

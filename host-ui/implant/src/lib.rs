@@ -13,5 +13,4 @@ pub mod readers;
 pub mod received;
 pub mod registration;
 pub mod score;
-pub mod slice;
 pub mod workflow;

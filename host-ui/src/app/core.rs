@@ -32,7 +32,9 @@ impl App {
     pub(super) fn start_core(&mut self) {
         let program = program();
         self.started_core = None;
-        self.files.first_scene = self.present_scene();
+        if let Some(scene) = self.present_scene() {
+            self.files.first_scene = Some(scene);
+        }
         let started = Command::new(&program)
             .args(["--instance", &self.shown.instance, "--rt-if-allowed"])
             .stdin(Stdio::null())

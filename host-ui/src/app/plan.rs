@@ -79,7 +79,6 @@ impl App {
             PlanAction::Cancel => planner.cancel(),
             PlanAction::Import(path) => {
                 if let Some(scene) = self.link.scene() {
-                    self.workflow.plan.own_file = Some(path.clone());
                     planner.import(path, scene.clone(), scene_file);
                 }
             }

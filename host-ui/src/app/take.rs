@@ -203,7 +203,7 @@ impl App {
         };
         let is_new = at.is_some_and(|at| state.tick.saturating_sub(at) < NEW_TICKS) && at != before;
         if is_new && self.run.is_none() && !self.watches() {
-            self.refuse("The needle was stopped: the PC was too busy to confirm its motion in time. Move it again.");
+            self.refuse("The needle was stopped before its goal: its motion was not confirmed in time. Move it again.");
         }
     }
 

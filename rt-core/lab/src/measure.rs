@@ -287,7 +287,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
             priority: if options.no_rt { 1 } else { options.haptic_priority },
             thread: FORCE_THREAD,
             from_core: core,
-            gives_way: true,
+            low_priority: true,
         };
         let others = threads.spawn(move || others::watch(machine, looked_at, before, stop));
         let paired = setup

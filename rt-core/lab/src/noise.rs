@@ -48,7 +48,7 @@ pub fn pass(machine: &Machine, options: &Options, duration_ns: u64, interrupted:
         priority: look.priority.unwrap_or(1),
         thread: THREAD,
         from_core: options.tissue_core,
-        gives_way: false,
+        low_priority: false,
     };
     let (before, stop) = (others::before(machine), AtomicBool::new(false));
     let (begin, began_ns) = (Instant::now(), clock::now_ns());

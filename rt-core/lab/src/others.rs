@@ -115,8 +115,8 @@ pub struct Watched {
     /// Name of its thread.
     pub thread: &'static str,
     pub from_core: Option<usize>,
-    /// Every other thread comes first, as the loops may need what this look costs.
-    pub gives_way: bool,
+    /// Its own thread gets a small share of a busy core: the loops may need what a look costs.
+    pub low_priority: bool,
 }
 
 /// The state of the PC before a measurement.
@@ -141,8 +141,8 @@ pub fn watch(machine: &Machine, watched: Watched, before: Before, stop: &AtomicB
         priority: None,
         core: watched.from_core,
     });
-    if watched.gives_way {
-        arm::give_way();
+    if watched.low_priority {
+        arm::lower_priority();
     }
     let mut others = Others {
         moments: vec![before.moment.clone()],

@@ -99,6 +99,14 @@ fn a_new_window_moves_nothing() {
 fn a_core_that_was_killed_is_started_again_by_a_click() {
     let mut driven = Driven::open_plain([1280.0, 800.0]);
     driven.plan_and_place();
+    let is_pelvis = |app: &App| {
+        app.link()
+            .scene()
+            .is_some_and(|scene| scene.header.name.read() == "pelvis")
+    };
+    driven.click("1  Choose the scene");
+    driven.click("pelvis");
+    driven.until("the other scene", is_pelvis);
     let run = |app: &App| app.link().session().map(|session| session.session_id);
     let first = run(driven.window.state());
     driven.core.kill_only();
@@ -113,6 +121,9 @@ fn a_core_that_was_killed_is_started_again_by_a_click() {
     driven.click("Start it again");
     driven.until("another run", |app| {
         run(app).is_some_and(|id| Some(id) != first) && app.link().state().is_some()
+    });
+    driven.until("the scene that was open", |app| {
+        run(app).is_some_and(|id| app.link().scene().is_some_and(|s| s.header.session_id == id)) && is_pelvis(app)
     });
     assert!(
         driven

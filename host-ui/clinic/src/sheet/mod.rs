@@ -4,18 +4,19 @@
 mod figures;
 mod page;
 mod sectors;
+mod slice;
 
 pub use figures::{NotComputed, Row, rows};
 pub use page::page;
 pub use sectors::Sector;
 
 use serde_json::{Value, json};
+use slice::Slice;
 use stylet_anatomy::Organ;
 use stylet_dose::edema::Edema;
 use stylet_dose::structure::bounds;
 use stylet_dose::{DoseKernel, DosePoints, Dvh, Seed, Source, Structure};
 use stylet_implant::registration::RigidFit;
-use stylet_implant::slice::Slice;
 
 /// Margin around seeds and target in which volumes at a dose are searched.
 const MARGIN_M: f64 = 0.03;

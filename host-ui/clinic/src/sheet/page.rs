@@ -1,6 +1,7 @@
 //! The page as self-contained HTML that prints on one sheet of A4.
 
 use super::figures::{DEFINITIONS, NotComputed, Row, rows};
+use super::slice::Slice;
 use super::{Column, Implant};
 use maud::{Markup, PreEscaped, html};
 use stylet_anatomy::Organ;
@@ -9,7 +10,6 @@ use stylet_dose::criteria::shown;
 use stylet_dose::decay::s_to_days;
 use stylet_dose::effect::Response;
 use stylet_dose::picture::Curve;
-use stylet_implant::slice::Slice;
 use stylet_report::picture::DrawError;
 
 /// Size of the histograms, which leaves the rest on the same sheet.

@@ -86,7 +86,7 @@ pub fn arm(ask: Ask) -> Result<Armed, Refused> {
 
 /// Gives the calling thread a small share of a busy core. In the idle class it would get none, and name no cause of a
 /// late tick. Does nothing if the kernel refuses.
-pub fn give_way() {
+pub fn lower_priority() {
     // SAFETY: no pointers; 0 names the calling thread.
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, 10) };
 }

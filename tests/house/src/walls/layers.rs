@@ -333,6 +333,7 @@ pub const LAYERS: &[Layer] = &[
             "host-ui/host",
             "host-ui/implant",
             "host-ui/population",
+            "host-ui/surfaces",
             "shm-schema",
             "shm-schema/anatomy",
             "shm-schema/manual",

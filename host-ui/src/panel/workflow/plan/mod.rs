@@ -23,7 +23,7 @@ use stylet_implant::plan::{Hole, ImplantPlan};
 pub struct PlanState {
     /// Path of a plan file.
     pub path: String,
-    /// File that was opened or saved for this scene, which *Save* replaces without a question.
+    /// File that was saved for this scene, which *Save* replaces without a question.
     pub own_file: Option<PathBuf>,
     pub(super) hole: Hole,
     /// Selected needle, if it goes through no hole.
