@@ -42,8 +42,8 @@ impl Simd {
 /// Compiles the caller's function `generic` for each set of instructions and calls the one for `$simd`: with the types
 /// `$portable`, or `$wide` where there is AVX2 or more.
 ///
-/// A closure would not do: what is called from several places is not inlined, and only what is inlined is compiled for
-/// the instructions of its caller.
+/// Nothing below it may be a closure: what is called from several places is not inlined, and only what is inlined is
+/// compiled for the instructions of its caller. `vector_instructions_are_no_calls` looks for them in the programs.
 macro_rules! dispatch {
     (
         $simd:ident, [$($generics:tt)*] [$($names:tt)*] [$($portable:tt)*] [$($wide:tt)*]

@@ -60,3 +60,27 @@ fn the_loops_keep_their_contract(options: &[&str], ticks: u64) {
         }
     }
 }
+
+/// A closure between a kernel and its vectors is enough for an instruction to become a call, several times as slow.
+#[test]
+#[cfg(target_arch = "x86_64")]
+fn vector_instructions_are_no_calls() {
+    let listing = std::process::Command::new("objdump")
+        .args(["--disassemble", "--demangle", "--no-show-raw-insn"])
+        .arg(stylet_test_kit::program("rt-core"))
+        .output()
+        .expect("binutils");
+    let listing = String::from_utf8_lossy(&listing.stdout);
+    assert!(listing.contains("<stylet_sim::"), "no names");
+    let mut within = "";
+    let mut calls = std::collections::BTreeSet::new();
+    for line in listing.lines() {
+        if line.ends_with(">:") {
+            within = line;
+        } else if line.contains("call") && line.contains("core_arch") && line.contains("mm") {
+            let is_ours = within.contains("<stylet_") || within.contains("<core::array");
+            calls.extend(is_ours.then_some(within));
+        }
+    }
+    assert!(calls.is_empty(), "{calls:#?}");
+}

@@ -206,23 +206,20 @@ fn violations<V: Vector<f32>>(l: &Lanes<V>, u: &[&[f32]; 3], lo: usize, hi: usiz
     stretch.greater(b.abs().greater(c.abs()) - l.tan * (l.rest + along))
 }
 
-/// Returns the largest of the first `n` numbers that `of` gives, eight at a time; zero if none is above.
+/// Returns the greater of `most` and the first `n` numbers of `found`, in each lane.
 #[inline(always)]
-fn largest<V: Vector<f32>>(n: usize, of: impl Fn(usize) -> V) -> f32 {
-    let zero = V::splat(0.0);
-    let mut most = zero;
-    for e in (0..n).step_by(LANES) {
-        let found = of(e);
-        let found = if n - e < LANES {
-            V::select(first(n - e), found, zero)
-        } else {
-            found
-        };
-        most = found.greater(most);
-    }
-    let mut lanes = [0.0; LANES];
-    most.store(&mut lanes);
-    lanes.into_iter().fold(0.0, greater)
+fn with_first<V: Vector<f32>>(most: V, found: V, n: usize) -> V {
+    let found = if n < LANES {
+        V::select(first(n), found, most)
+    } else {
+        found
+    };
+    found.greater(most)
+}
+
+#[inline(always)]
+fn largest<V: Vector<f32>>(most: V) -> f32 {
+    most.numbers().into_iter().fold(0.0, greater)
 }
 
 /// Returns the largest violation of the links `lo + n` to `hi + n`; zero if there is none. The stretches may overlap.
@@ -230,7 +227,11 @@ fn largest<V: Vector<f32>>(n: usize, of: impl Fn(usize) -> V) -> f32 {
 pub(crate) fn violation<V: Vector<f32>>(l: &Scaled, u: &[&[f32]; 3], lo: usize, hi: usize, n: usize) -> f32 {
     let n = n.min(shortest(u).saturating_sub(lo.max(hi)));
     let l = Lanes::<V>::of(l);
-    largest(n, |e| violations(&l, u, lo + e, hi + e))
+    let mut most = V::splat(0.0);
+    for e in (0..n).step_by(LANES) {
+        most = with_first(most, violations(&l, u, lo + e, hi + e), n - e);
+    }
+    largest(most)
 }
 
 /// Returns the first of the links between consecutive elements `start..end` and the next that is violated by more than
@@ -268,10 +269,12 @@ in_vectors! {
 /// Returns the largest square of a displacement.
 fn largest_square<V: Vector<f32>>(u: &[&[f32]; 3], start: usize, end: usize) -> f32 {
     let n = end.min(shortest(u)).saturating_sub(start);
-    largest(n, |e| {
+    let mut most = V::splat(0.0);
+    for e in (0..n).step_by(LANES) {
         let [x, y, z]: [V; 3] = [load(u[0], start + e), load(u[1], start + e), load(u[2], start + e)];
-        x * x + y * y + z * z
-    })
+        most = with_first(most, x * x + y * y + z * z, n - e);
+    }
+    largest(most)
 }
 }
 

@@ -106,7 +106,11 @@ fn there_and_back_along_z<V: Vector<f32>>(grid: &Grid, halves: &[[f32; HALF + 1]
 
 #[inline(always)]
 fn line<V: Vector<f32>>(values: &[f32], at: usize, step: usize) -> [V; INNER] {
-    std::array::from_fn(|n| V::load(values[at + n * step..][..ROW].try_into().expect("a row")))
+    let mut line = [V::splat(0.0); INNER];
+    for (n, to) in line.iter_mut().enumerate() {
+        *to = V::load(values[at + n * step..][..ROW].try_into().expect("a row"));
+    }
+    line
 }
 
 #[inline(always)]
