@@ -10,7 +10,7 @@
 use super::model::LineModel;
 use super::rows::{add_scaled, dot};
 use super::state::{LineOutput, LineState};
-use super::tip::{Place, follow};
+use super::tip::{Place, Tried, follow};
 use forces::solve;
 pub(super) use forces::{Neighbours, Shaft, find_by_sets, sweep};
 pub(super) use membrane::{Spring, meet, press};
@@ -130,7 +130,7 @@ pub(super) fn advance(
         stay_outside(model, state, &mut output);
         return output;
     }
-    let mut before = None;
+    let mut tried = Tried::none(&state.tip);
     for _ in 0..MAX_PASSES {
         let front = model.front(&state.tip);
         others.begin(model, state, tip_m, front.membrane);
@@ -142,11 +142,14 @@ pub(super) fn advance(
             if is_pushed || pushed_m >= model.layers[layer].puncture_depth_m {
                 state.tip.opened |= 1 << layer;
                 output.punctured = output.punctured.or(Some(layer));
-                before = None;
+                tried = Tried::none(&state.tip);
                 continue;
             }
         }
+        let past_m = tried.past_m(state, &front, gap_m);
+        let gap_m = past_m.unwrap_or(gap_m);
         let goes_on = gap_m > CLOSED_M && is_pushed && front.membrane.is_none();
+        let is_past = gap_m.abs() > CLOSED_M && past_m.is_some();
         let goes_back = gap_m < -CLOSED_M && state.tip.force_n <= 0.0;
         if goes_back && front.membrane.is_some() && state.tip.draw_back(-gap_m) {
             continue;
@@ -158,11 +161,9 @@ pub(super) fn advance(
             material_m: state.tip.material_m,
             gap_m,
         };
-        if !(goes_on || goes_back) || !follow(model, state, tip_m, front.to_m, place, before) {
+        if !(goes_on || goes_back || is_past) || !follow(model, state, tip_m, front.to_m, place, &mut tried) {
             break;
         }
-        // Beyond that it is another force that holds the tip.
-        before = (state.tip.material_m < front.to_m).then_some(place);
     }
     slip(model, state, tip_m);
     others.end();

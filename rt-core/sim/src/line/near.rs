@@ -51,8 +51,10 @@ impl NearTip {
             return 0.0;
         };
         let place = to_m.abs() / self.step_m;
-        let pair = self.integral_m.get(place as usize..).and_then(|rest| rest.get(..2));
-        let size_m = pair.map_or(*last_m, |pair| pair[0] + place.fract() * (pair[1] - pair[0]));
+        let at = place as usize;
+        let pair = self.integral_m.get(at..).and_then(|rest| rest.get(..2));
+        // `fract` is a call where the processor may lack an instruction for it.
+        let size_m = pair.map_or(*last_m, |pair| pair[0] + (place - at as f64) * (pair[1] - pair[0]));
         size_m.copysign(to_m)
     }
 

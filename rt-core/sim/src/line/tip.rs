@@ -8,15 +8,19 @@ use super::state::{LineState, TipState};
 const LEAST_KEPT: f64 = 0.02;
 /// Distance below which places are the same.
 const SAME_M: f64 = 1e-9;
-/// Tolerance of the tip's place.
-const PLACE_M: f64 = 1e-11;
+/// Tolerance of a place by the present loads; the solution that follows changes them.
+const PLACE_M: f64 = 1e-9;
 /// Largest factor by which a step through compressed tissue in front counts more than its length.
 const MOST_PRESSED: f64 = 10.0;
-/// Share of the way between two close places by which the gap closes at least.
-const LEAST_CLOSED: f64 = 0.25;
+/// Share of the way between two close places by which the gap closes at least: where the shaft sticks, the tip carries
+/// most of the tissue along.
+const LEAST_CLOSED: f64 = 0.05;
+const LEAST_CLOSED_BACK: f64 = 0.25;
 const MOST_CLOSED: f64 = 3.0;
-/// Share of the gap that remains when the way to the second place was right.
-const LEFT: f64 = 0.5;
+/// Share of the gap that remains on the way back when the way to the second place was right.
+const LEFT_BACK: f64 = 0.5;
+/// Share of the way between two places, on both sides, in which the next is not looked for.
+const LEAST_SHARE: f64 = 0.1;
 /// Stations around the tip that a pass can reach.
 const WINDOW: usize = 64;
 
@@ -176,31 +180,85 @@ pub(super) struct Place {
     pub gap_m: f64,
 }
 
+/// Places that were tried in one tick for a tip that goes through one front.
+pub(super) struct Tried {
+    /// Track before the tick.
+    track_m: f64,
+    /// Last place that was not far enough, and the nearest that was too far.
+    near: Option<Place>,
+    far: Option<Place>,
+}
+
+impl Tried {
+    pub(super) fn none(tip: &TipState) -> Self {
+        Tried {
+            track_m: tip.track_m,
+            near: None,
+            far: None,
+        }
+    }
+
+    /// Returns how far a tip has moved too far in this tick: on the way in it then presses less than it takes to advance,
+    /// on the way out it presses. `None` where it has not.
+    pub(super) fn past_m(&self, state: &LineState, front: &Front, gap_m: f64) -> Option<f64> {
+        let near = self.near.filter(|_| front.membrane.is_none())?;
+        let wanted_n = if near.gap_m > 0.0 { front.limit_n } else { 0.0 };
+        let past_n = state.tip.force_n - wanted_n;
+        (past_n * near.gap_m < 0.0).then(|| gap_m + state.memory.gain * state.tip_own * past_n)
+    }
+
+    /// Takes a place that was tried; returns where the gap closes by the others. `None` where these do not tell.
+    fn next_m(&mut self, now: Place) -> Option<f64> {
+        if let Some(near) = self.near.filter(|near| near.gap_m * now.gap_m < 0.0) {
+            self.far = Some(now);
+            return Some(between_m(near, now));
+        }
+        let before = self.near.replace(now);
+        match self.far {
+            Some(far) => Some(between_m(now, far)),
+            None => before.and_then(|before| onward_m(before, now)),
+        }
+    }
+}
+
+fn between_m(near: Place, far: Place) -> f64 {
+    let share = near.gap_m / (near.gap_m - far.gap_m);
+    near.material_m + share.clamp(LEAST_SHARE, 1.0 - LEAST_SHARE) * (far.material_m - near.material_m)
+}
+
 /// Returns where the gap closes if it keeps changing as it did from the place before to this one; `None` where these do
 /// not tell.
 fn onward_m(before: Place, now: Place) -> Option<f64> {
     let closed = (before.gap_m - now.gap_m) / (now.material_m - before.material_m);
-    let is_plain = (LEAST_CLOSED..MOST_CLOSED).contains(&closed) && now.gap_m.abs() < LEFT * before.gap_m.abs();
+    // A tip that is drawn back too far presses, and what it presses was not put in.
+    let (least, left) = if now.gap_m > 0.0 {
+        (LEAST_CLOSED, 1.0)
+    } else {
+        (LEAST_CLOSED_BACK, LEFT_BACK)
+    };
+    let is_plain = (least..MOST_CLOSED).contains(&closed) && now.gap_m.abs() < left * before.gap_m.abs();
     is_plain.then(|| now.material_m + now.gap_m / closed)
 }
 
 /// Moves the tip through the material to its place in the world, but not past `to_m`; returns whether it moved.
-/// `before` is the place that was tried before with the same front.
 pub(super) fn follow(
     model: &LineModel,
     state: &mut LineState,
     tip_m: f64,
     to_m: f64,
     now: Place,
-    before: Option<Place>,
+    tried: &mut Tried,
 ) -> bool {
-    let onward_m = before.and_then(|before| onward_m(before, now));
-    let place_m = match onward_m.filter(|m| (0.0..=to_m).contains(m)) {
+    let place_m = match tried.next_m(now).filter(|m| (0.0..=to_m).contains(m)) {
         Some(place_m) => place_m,
         None => nearest_m(model, state, tip_m, to_m, now),
     };
     state.tip.material_m = place_m;
-    state.tip.track_m = state.tip.track_m.max(place_m.min(model.length_m()));
+    state.tip.track_m = tried.track_m.max(place_m.min(model.length_m()));
+    if place_m >= to_m {
+        // Beyond that it is another force that holds the tip.
+        *tried = Tried::none(&state.tip);
+    }
     place_m != now.material_m
 }
 

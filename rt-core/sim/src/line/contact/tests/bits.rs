@@ -4,7 +4,7 @@ use super::*;
 
 /// Digest made with the forces by sets, the surface where it is by then, stations that a membrane relieves, and nothing
 /// left to cut in a track; a change of the contact itself changes it.
-const BITS: u64 = 0xa3e7_bddd_a751_f28b;
+const BITS: u64 = 0xceb5_7d7d_0d4f_4811;
 
 /// Returns the same as [`made_up`] without functions that round otherwise on another machine.
 pub fn exact(settings: LineSettings) -> LineModel {
