@@ -13,7 +13,7 @@ use std::time::Instant;
 use stylet_controllers::Wish;
 use stylet_implant::workflow::{default_plan, move_request};
 use stylet_shm_schema::{
-    PARAMETERS, ParameterChange, ParameterProblems, ParameterSet, PlannedNeedle, ProblemList, Request,
+    BUILTIN_SCENES, PARAMETERS, ParameterChange, ParameterProblems, ParameterSet, PlannedNeedle, ProblemList, Request,
 };
 
 /// Farthest goal ahead of the tip for a hand that pulls it.
@@ -41,9 +41,15 @@ impl App {
     }
 
     pub(super) fn load_builtin(&mut self, number: usize) {
-        // What was said of a file is of the scene before.
-        self.shown.load = LoadState::Idle;
-        self.send("Built-in scene", &Request::LoadBuiltinScene(number as u32));
+        let name = BUILTIN_SCENES[number];
+        self.shown.load = match self.link.send(&Request::LoadBuiltinScene(number as u32)) {
+            Err(e) => LoadState::Refused(e.to_string()),
+            Ok(id) => {
+                (self.files.scene_to_come, self.files.image_to_come) = (None, None);
+                self.files.uploading = Some((id, name.to_owned()));
+                LoadState::Sending(format!("building {name}"))
+            }
+        };
     }
 
     /// Sends the hand to a depth along the planned path, or along the parallel line on which the

@@ -23,9 +23,10 @@ pub(super) type Saved = Result<PathBuf, Failure>;
 /// Any error, shown as text.
 pub(super) type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-/// Returns a new folder for an implant that is about to be lost, named after the cause and the time.
+/// Returns the whole path of a new folder under out/, named after what is written and the time.
 pub(super) fn folder_of(why: &str) -> PathBuf {
-    PathBuf::from(format!("out/{why}-{}", format::utc_now()))
+    let folder = PathBuf::from(format!("out/{why}-{}", format::utc_now()));
+    std::path::absolute(&folder).unwrap_or(folder)
 }
 
 /// Data of a debrief, as of the request for it.
@@ -52,8 +53,7 @@ impl App {
         if let Some(number) = self.trainees.followed {
             return self.debrief_trainee(number);
         }
-        let own = || PathBuf::from(format!("out/debrief-{}", format::utc_now()));
-        let folder = self.trainees.folder().unwrap_or_else(own);
+        let folder = self.trainees.folder().unwrap_or_else(|| folder_of("debrief"));
         self.save_debrief_as(folder);
     }
 

@@ -1,6 +1,7 @@
 //! Executes the operator's requests in a plan of many needles.
 
 use super::App;
+use super::debrief::folder_of;
 use super::drive::Drive;
 use crate::action::PlanAction;
 use crate::panel::question::{Begin, Question};
@@ -9,7 +10,6 @@ use crate::settings::Layout;
 use nalgebra::Vector3;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use stylet_base::format;
 use stylet_implant::plan::exchange;
 use stylet_implant::workflow::{NeedleTask, Placed, Run, default_plan};
 use stylet_shm_schema::{PlannedNeedle, Prescribed, Request, Text};
@@ -91,7 +91,7 @@ impl App {
             }
             PlanAction::ExportStudy => {
                 if let Some(scene) = self.link.scene() {
-                    let folder = PathBuf::from(format!("out/study-{}", format::utc_now()));
+                    let folder = folder_of("study");
                     planner.export_study(folder, scene.clone(), scene_file);
                 }
             }

@@ -2,14 +2,13 @@
 //! folder of a class.
 
 use super::App;
-use super::debrief::Delivered;
+use super::debrief::{Delivered, folder_of};
 use crate::action::TraineeAction;
 use crate::planner::Planner;
 use crate::shown::all_errors;
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use stylet_base::format;
 use stylet_host::link::{Link, LinkStatus};
 use stylet_host::roster::{self, Glance, Trainee};
 use stylet_implant::received::ReceivedProcedure;
@@ -159,7 +158,7 @@ impl App {
         let (Some(seat), Some(trainee)) = (list.seats.get(number), list.all.get(number)) else {
             return;
         };
-        let own = || PathBuf::from(format!("out/debrief-{}-{}", trainee.name, format::utc_now()));
+        let own = || folder_of(&format!("debrief-{}", trainee.name));
         let folder = list.folder_of(&trainee.name).unwrap_or_else(own);
         let mut planned = seat.heard.prescribed().unwrap_or_default();
         if planned.strength_u == 0.0 {

@@ -57,10 +57,7 @@ fn running_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         });
     });
     // On a separate line, because a long text must not widen the panel.
-    let text = match waits(shown) {
-        Some(waits) => format!("{step}: {waits}"),
-        None => step.to_owned(),
-    };
+    let text = waits(shown).unwrap_or_else(|| step.to_owned());
     ui.add(egui::Label::new(theme::weak(text)).truncate());
 }
 
