@@ -204,7 +204,7 @@ impl Tried {
         let near = self.near.filter(|_| front.membrane.is_none())?;
         let wanted_n = if near.gap_m > 0.0 { front.limit_n } else { 0.0 };
         let past_n = state.tip.force_n - wanted_n;
-        (past_n * near.gap_m < 0.0).then(|| gap_m + state.memory.gain * state.tip_own * past_n)
+        (past_n * near.gap_m < 0.0).then_some(gap_m + state.memory.gain * state.tip_own * past_n)
     }
 
     /// Takes a place that was tried; returns where the gap closes by the others. `None` where these do not tell.

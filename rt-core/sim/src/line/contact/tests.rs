@@ -272,10 +272,8 @@ fn ten_thousand_random_cycles_make_no_energy() {
     assert!(worst_j < 1e-6, "{worst_j}");
 }
 
-/// As above in tissue that a tip narrower than its patch dents deeper, with a wedge that opens the cut; it meets the
-/// inner membrane with that dent, and the membrane is a spring.
-#[test]
-fn a_narrow_tip_that_cuts_makes_no_energy() {
+/// Returns made-up tissue that a tip narrower than its patch dents deeper, with a wedge that opens the cut.
+fn narrow() -> LineModel {
     let layers = [0.0, 17e-3].map(|from_m| LineLayer {
         from_m,
         puncture_force_n: 4.0,
@@ -287,6 +285,14 @@ fn a_narrow_tip_that_cuts_makes_no_energy() {
     model.compliance.tip_missing_m_per_n.fill(11e-3);
     model.compliance.near = NearTip::new(0.635e-3, 2.5e-3, 0.49);
     model.compliance.wedge_n.fill(0.02);
+    model
+}
+
+/// As above in tissue that a tip narrower than its patch dents deeper, with a wedge that opens the cut; it meets the
+/// inner membrane with that dent, and the membrane is a spring.
+#[test]
+fn a_narrow_tip_that_cuts_makes_no_energy() {
+    let model = narrow();
     let worst_j = random_cycles(&model, 10_000, LineState::elastic_j);
     assert!(worst_j < 1e-6, "{worst_j}");
 }

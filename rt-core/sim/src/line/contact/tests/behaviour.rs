@@ -2,6 +2,29 @@
 
 use super::*;
 
+/// At 5 mm/s, in, half back and in again: where the shaft sticks, the tip carries most of the tissue along.
+#[test]
+fn a_tip_that_cuts_is_where_the_world_has_it() {
+    let model = narrow();
+    let mut state = LineState::new(&model);
+    let (mut ticks, mut open, mut worst_m) = (0, 0, 0.0_f64);
+    let mut tip_m = -1e-3;
+    for end_m in [20e-3, 10e-3, 25e-3] {
+        while tip_m != end_m {
+            tip_m += f64::clamp(end_m - tip_m, -5e-6, 5e-6);
+            let output = step(&model, &mut state, &at(tip_m));
+            if output.tip_n > 0.0 && output.held_by.is_none() {
+                let gap_m = (tip_m - state.tip.material_m - state.tip_u_m).abs();
+                ticks += 1;
+                open += u32::from(gap_m > CLOSED_M);
+                worst_m = worst_m.max(gap_m);
+            }
+        }
+    }
+    println!("{open} of {ticks} ticks end with a gap, at most {worst_m:.1e} m");
+    assert!(ticks > 3_000 && open < ticks / 100, "{open} of {ticks}");
+}
+
 #[test]
 fn a_membrane_gives_way_once_and_its_track_stays_open() {
     let layers = [LineLayer {
