@@ -116,7 +116,7 @@ population: products ## Insert the 10,016 needles of docs/study/population.toml,
 	$(BIN)/rt-core study docs/study/population.toml --out $(BIN)/population
 	$(BIN)/host-ui study $(BIN)/population
 
-validation: ## Compute what docs/validation.md compares with patients, and the error of one seed, and write that page (a minute)
+validation: ## Compute what docs/validation.md compares with patients, by friction as well, and the error of one seed, and write that page (some ten minutes)
 	UPDATE_DOCS=1 $(CARGO) test --profile quick -p stylet-study --lib validation_is_written -- --ignored --nocapture
 
 relay-test: deps-test build ## Test the relay with whole processes (about three minutes)

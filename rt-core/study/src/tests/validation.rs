@@ -2,8 +2,10 @@
 
 mod budget;
 mod figures;
+mod friction;
 
 use crate::Study;
+use crate::tests::shards::finished_in;
 use serde::Deserialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -69,7 +71,8 @@ fn the_page_of_validation_has_every_published_figure() {
 #[test]
 #[ignore = "insertions of some minutes"]
 fn validation_is_written() {
-    let stylet = figures::of_stylet();
+    let table = finished_in(&study("validation.toml"));
+    let stylet = figures::of_stylet(&table);
     let mut page = HEAD.to_owned();
     page.push_str(&figures::about());
     page.push_str("| what | published | Stylet | Stylet / published | use | source, and what it means |\n|---|---|---|---|---|---|\n");
@@ -100,6 +103,8 @@ fn validation_is_written() {
             "| {what} | {value} {unit}; {how} | {own} | {ratio} | {used}{checked} | {source}: {note} |"
         );
     }
+    page.push('\n');
+    page.push_str(&friction::section(&table));
     page.push('\n');
     page.push_str(&budget::section());
     print!("{page}");

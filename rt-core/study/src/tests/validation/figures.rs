@@ -2,8 +2,7 @@
 
 use super::budget::{paper, stage};
 use super::study;
-use crate::tests::shards::finished_in;
-use stylet_insertions::{Insertion, Seed};
+use stylet_insertions::{Insertion, Seed, Table};
 use stylet_runtime::rehearse::Stage;
 use stylet_shm_schema::{ParameterId, ParameterSet};
 use stylet_sim::scene::{Scene, TissueKind};
@@ -36,7 +35,8 @@ count strands of two and more: the published seeds are in strands, and the plan 
     )
 }
 
-struct Placed {
+/// A seed of a strand.
+pub struct Placed {
     planned_mm: [f64; 3],
     off_mm: [f64; 3],
 }
@@ -53,6 +53,27 @@ impl Placed {
     fn total_mm(&self) -> f64 {
         self.off_mm.iter().map(|c| c * c).sum::<f64>().sqrt()
     }
+}
+
+/// Returns the needles with strands, and those with a single seed.
+fn by_seeds(table: &Table) -> (Vec<&Insertion>, Vec<&Insertion>) {
+    table.rows.iter().partition(|row| row.seeds.len() > 1)
+}
+
+/// Returns the seeds that rest in strands.
+pub fn in_strands(table: &Table) -> Vec<Placed> {
+    let seeds = by_seeds(table).0.into_iter().flat_map(|row| &row.seeds);
+    seeds.filter_map(Placed::of).collect()
+}
+
+/// Returns the mean misplacement, then its mean absolute part to the side, up or down, and along the needle.
+pub fn mean_parts_mm(seeds: &[Placed]) -> [f64; 4] {
+    let along = |axis: usize| mean(seeds.iter().map(|seed| seed.off_mm[axis].abs()));
+    [mean(seeds.iter().map(Placed::total_mm)), along(0), along(1), along(2)]
+}
+
+pub fn failed(table: &Table) -> usize {
+    table.rows.iter().filter(|row| row.outcome.is_err()).count()
 }
 
 fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
@@ -78,20 +99,15 @@ fn misplacement_mm(row: &Insertion) -> Option<f64> {
     (!seeds.is_empty()).then(|| mean(seeds))
 }
 
-pub fn of_stylet() -> Vec<Own> {
-    let table = finished_in(&study("validation.toml"));
+pub fn of_stylet(table: &Table) -> Vec<Own> {
     let (low, high) = Scene::builtin("pelvis").expect("built in").target_bounds_m();
     let share = |seed: &Placed, axis: usize| (1e-3 * seed.planned_mm[axis] - low[axis]) / (high[axis] - low[axis]);
-    let (strands, single): (Vec<&Insertion>, Vec<&Insertion>) = table.rows.iter().partition(|row| row.seeds.len() > 1);
-    let seeds: Vec<Placed> = strands
-        .iter()
-        .flat_map(|row| &row.seeds)
-        .filter_map(Placed::of)
-        .collect();
+    let (strands, single) = by_seeds(table);
+    let seeds = in_strands(table);
+    let [total_mm, side_mm, up_mm, along_mm] = mean_parts_mm(&seeds);
     let single_mm = mean(single.iter().filter_map(|row| misplacement_mm(row)));
     let motions: Vec<_> = table.rows.iter().filter_map(|row| row.outcome.as_ref().ok()).collect();
-    let failed = table.rows.len() - motions.len();
-    let along = |axis: usize| mean(seeds.iter().map(|seed| seed.off_mm[axis].abs()));
+    let failed = failed(table);
     let speed = table
         .quantities
         .iter()
@@ -115,15 +131,15 @@ pub fn of_stylet() -> Vec<Own> {
     vec![
         own(
             "seed misplacement",
-            mean(seeds.iter().map(Placed::total_mm)),
+            total_mm,
             &format!(
                 "{many}, {single_mm:.1} of single ones; {failed} of {} needles failed",
                 table.rows.len()
             ),
         ),
-        own("seed misplacement, to the side", along(0), &many),
-        own("seed misplacement, up or down", along(1), &many),
-        own("seed misplacement, along the needle", along(2), &many),
+        own("seed misplacement, to the side", side_mm, &many),
+        own("seed misplacement, up or down", up_mm, &many),
+        own("seed misplacement, along the needle", along_mm, &many),
         own(
             "misplacement at the base over midgland",
             ratio(
