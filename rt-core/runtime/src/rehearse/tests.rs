@@ -363,18 +363,23 @@ fn seeds_of_chainmail_beside_those_of_finite_elements() {
             };
             let results = stages.each_mut().map(|stage| {
                 let begun = Instant::now();
+                // Kept for the rehearsal.
+                if stage.lines.is_some() {
+                    stage.lines(&run, false, &stop).expect("a line");
+                }
+                let line = begun.elapsed();
                 let rehearsed = stage.rehearse(&run, &set, &stop).expect("goes through");
-                (rehearsed, begun.elapsed())
+                (rehearsed, line, begun.elapsed() - line)
             });
             let fem = &results[1].0;
-            for ((rehearsed, took), kind) in results.iter().zip(TissueKind::ALL) {
+            for ((rehearsed, line, took), kind) in results.iter().zip(TissueKind::ALL) {
                 let off = |seeds: &[SeedPose], n: usize| (seeds[n].position_m[2] - run.drops_m[n][2]) * 1e3;
                 let plan: Vec<String> = (0..4).map(|n| format!("{:5.1}", off(&rehearsed.seeds, n))).collect();
                 let apart = (0..4)
                     .map(|n| (off(&rehearsed.seeds, n) - off(&fem.seeds, n)).abs())
                     .fold(0.0, f64::max);
                 println!(
-                    "  {across_m:?} {:9}: off plan {} mm, from FEM {apart:.2} mm at most; peak {:.2} N ({:+.1} %), before puncture {:.1} mm; {took:.1?}",
+                    "  {across_m:?} {:9}: off plan {} mm, from FEM {apart:.2} mm at most; peak {:.2} N ({:+.1} %), before puncture {:.1} mm; line {line:.2?}, rest {took:.2?}",
                     kind.name(),
                     plan.join(" "),
                     rehearsed.peak_force_n,
