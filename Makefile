@@ -11,7 +11,7 @@ COMPRESSED = --features stylet-files/compressed
 PACKAGED = $(COMPRESSED) --features host-ui/screen-reader
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: animation attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release reproducible sbom package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: animation attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release reproducible sbom package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures python python-test clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -143,6 +143,22 @@ live-test: build live ## Watch 'host-ui record --live' for LIVE_SECONDS (60) wit
 	@docs/tools/need python3-venv
 	python3 -m venv $(BIN)/live-client && $(BIN)/live-client/bin/pip install -q websockets==17.4
 	docs/tools/live-test "$(BIN)" $(BIN)/live-client/bin/python $(or $(LIVE_SECONDS),60)
+
+# In a target folder of its own: other features of what both build would build it twice.
+PYTHON = $(abspath $(BIN)/../python)
+WHEELS = $(abspath $(or $(CARGO_TARGET_DIR),target))/package
+
+python: ## Build the Python package, a wheel for Python 3.9 or newer, into target/package (some minutes)
+	@docs/tools/need cargo python3-venv
+	python3 -m venv $(PYTHON)/maturin && $(PYTHON)/maturin/bin/pip install -q maturin==1.16.0
+	cd rt-core/python && CARGO_TARGET_DIR=$(PYTHON) $(PYTHON)/maturin/bin/maturin build --release --locked --out $(WHEELS)
+
+python-test: python ## Install the wheel in a fresh environment, and test it beside the same in Rust, dicompyler-core and pymedphys (three minutes)
+	python3 -m venv --clear $(PYTHON)/test
+	$(PYTHON)/test/bin/pip install -q -r rt-core/python/tests/requirements.txt
+	$(PYTHON)/test/bin/pip install -q --no-deps $(WHEELS)/stylet-*.whl
+	cd rt-core/python && CARGO_TARGET_DIR=$(PYTHON) $(CARGO) run --quiet --release --locked --example steps >$(PYTHON)/steps
+	cd rt-core/python && STYLET_STEPS=$(PYTHON)/steps $(PYTHON)/test/bin/python -m pytest -s
 
 attributes: ## Read 10,000 objects of each kind with damaged attributes; a wrong figure without a note fails
 	STYLET_ATTRIBUTES=$(or $(OBJECTS),10000) $(CARGO) test --profile quick -p stylet-files --lib damaged_attributes -- --nocapture

@@ -23,6 +23,7 @@ mod structures;
 
 pub use definition::{Gland, Study};
 pub use error::StudyError;
+pub use progress::Progress;
 pub use run::{Ended, Order, run};
 
 #[cfg(test)]

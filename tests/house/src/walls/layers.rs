@@ -363,6 +363,24 @@ pub const LAYERS: &[Layer] = &[
         never: &[],
         not_itself: &[PORTS],
     },
+    // For scripts of either side, without a process of its own.
+    Layer {
+        folder: "rt-core/python",
+        may_use: &[
+            "host-ui/dose",
+            "host-ui/files",
+            "hw",
+            "rt-core/runtime",
+            "rt-core/sim",
+            "rt-core/study",
+            "shm-schema",
+            "shm-schema/anatomy",
+            "shm-schema/insertions",
+            "shm-schema/procedure",
+        ],
+        never: &[WINDOW, PORTS],
+        not_itself: &[ARGUMENTS, PROGRAM, DEVICES, DICOM, SYSTEM],
+    },
 ];
 
 /// Crates for tests and measurements: they may use every crate, and no other crate may use them.

@@ -52,7 +52,7 @@ pub fn members() -> Vec<String> {
 }
 
 /// Packages outside the workspace that depend on its crates, with their own lock file.
-const ALONE: [&str; 1] = ["host-ui/relay"];
+const ALONE: [&str; 2] = ["host-ui/relay", "rt-core/python"];
 
 /// Returns the folders of the workspace's members and of the packages outside it.
 pub fn packages() -> Vec<String> {
