@@ -1,9 +1,11 @@
-"""Computes the dose of a rehearsed needle in the paper's gland, and its histogram beside that of dicompyler-core.
+"""Rehearses a plan in the paper's gland, and draws the histogram of its dose beside that of dicompyler-core.
 
     python dvh_beside_dicompyler.py dvh.png
 """
 
+import pathlib
 import sys
+import tomllib
 
 import matplotlib
 
@@ -13,25 +15,34 @@ import numpy as np
 import stylet
 from dicompylercore import dvh as dicompyler
 
-PRESCRIPTION_GY = 145.0
-STRENGTH_U = 0.6
-# Two rows of holes on either side of the urethra, 86.4 mm deep; seeds from the entry.
-HOLES_MM = [(x, y, 86.401) for x in (57.979, 67.979, 77.979, 87.979) for y in (34.715, 44.715, 54.715)]
-SEEDS_MM = [45.0, 35.0, 25.0, 15.0]
+PLAN = tomllib.loads((pathlib.Path(__file__).parents[3] / "docs/study/paper-plan.toml").read_text())
+PRESCRIPTION_GY = PLAN["prescription_gy"]
+SEED_MM = 4.5
 BIN_GY = 0.5
 
 
-def implant(scene: stylet.Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Returns the seeds at rest, their axes, and where they were planned."""
+def implant(scene: stylet.Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Rehearses each needle of the plan; returns its seeds at rest, their axes, strengths and planned places."""
     stage = stylet.Stage(scene, linear=True)
-    done = [stage.rehearse(hole, (0, 0, 1), SEEDS_MM) for hole in HOLES_MM]
-    return tuple(np.concatenate([getattr(one, name) for one in done]) for name in ("seeds_mm", "axes", "planned_mm"))
+    seeds_mm, axes, strengths_u, planned_mm = [], [], [], []
+    for needle in PLAN["needle"]:
+        pitch_mm = SEED_MM + needle["spacer_mm"] if "spacer_mm" in needle else None
+        done = stage.rehearse(
+            needle["entry_mm"], needle["direction"], needle["seed_along_mm"], strand_pitch_mm=pitch_mm
+        )
+        seeds_mm.append(done.seeds_mm)
+        axes.append(done.axes)
+        planned_mm.append(done.planned_mm)
+        strengths_u.append(needle["strength_u"])
+    return tuple(np.concatenate(rows) for rows in (seeds_mm, axes, strengths_u, planned_mm))
 
 
-def histograms(scene: stylet.Scene, seeds_mm: np.ndarray, axes: np.ndarray) -> tuple[stylet.Dvh, dicompyler.DVH]:
+def histograms(
+    scene: stylet.Scene, seeds_mm: np.ndarray, axes: np.ndarray, strengths_u: np.ndarray
+) -> tuple[stylet.Dvh, dicompyler.DVH]:
     """Returns the histogram of the target by both, of the same points."""
     points_mm, volumes_cc = scene.points(pitch_mm=1.0)
-    dose_gy = stylet.Source("6711").dose(points_mm, seeds_mm, STRENGTH_U, axes)
+    dose_gy = stylet.Source("6711").dose(points_mm, seeds_mm, strengths_u, axes)
     # dicompyler counts points; those on the edge stand for a part of a cube.
     edges = np.arange(0.0, dose_gy.max() + BIN_GY, BIN_GY)
     counts, _ = np.histogram(dose_gy, edges, weights=volumes_cc)
@@ -51,10 +62,10 @@ def figures(ours: stylet.Dvh, theirs: dicompyler.DVH) -> dict[str, tuple[float, 
 
 def main(path: str) -> None:
     scene = stylet.Scene("paper")
-    seeds_mm, axes, planned_mm = implant(scene)
+    seeds_mm, axes, strengths_u, planned_mm = implant(scene)
     errors_mm = np.linalg.norm(seeds_mm - planned_mm, axis=1)
     print(f"{len(seeds_mm)} seeds, on average {errors_mm.mean():.1f} mm from the plan")
-    ours, theirs = histograms(scene, seeds_mm, axes)
+    ours, theirs = histograms(scene, seeds_mm, axes, strengths_u)
     for name, (mine, other) in figures(ours, theirs).items():
         print(f"{name:6} {mine:8.2f} {other:8.2f}")
     doses = np.linspace(0.0, 3.0 * PRESCRIPTION_GY, 400)

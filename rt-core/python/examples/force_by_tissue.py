@@ -1,4 +1,4 @@
-"""Draws the force on the hand against depth, for the three tissue models: a needle into the paper's gland and out again.
+"""Draws force against depth for the three tissue models: a needle into the paper's gland and out again.
 
     python force_by_tissue.py force.png
 """
@@ -32,7 +32,8 @@ def main(path: str) -> None:
         axes.plot(outwards["depth_mm"], outwards["resistance_n"], color=colour, linestyle=":")
         print(f"{tissue:10} at most {inwards['resistance_n'].max():.2f} N inwards")
     axes.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
-    axes.set(xlabel="depth from the entry, mm", ylabel="force against the needle, N", title="In (full) and out (dotted), 20 mm/s")
+    axes.set(xlabel="depth from the entry, mm", ylabel="force against the needle, N")
+    axes.set_title("Into the gland (full) and out (dotted) at 20 mm/s")
     axes.legend(frameon=False)
     figure.savefig(path, dpi=120)
 

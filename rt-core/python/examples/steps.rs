@@ -1,5 +1,5 @@
-//! Ten thousand steps of 1 ms without Python, over the device that plays recorded motions: what `tests/test_insertion.py`
-//! compares `Insertion.step` with, bit by bit, and the time that they take.
+//! Ten thousand steps of 1 ms without Python, over the device that plays recorded motions: what
+//! `tests/test_insertion.py` compares `Insertion.step` with, bit by bit, and the time that they take.
 //!
 //! Prints a line for each step: depth, mm, and the bits of the force, N. The last line has the time of all, s.
 
@@ -34,7 +34,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut world = World::new(source.build()?, tissue, active.limits.clone(), 1)?;
     world.migration = active.migration;
     let body = LineBody::of_source(&source, tissue)?.ok_or("chainmail has lines")?;
-    let line = body.prepare(1, ENTRY_M, [0.0, 0.0, 1.0], active.force.bending.is_on(), &[], &mut || true)?;
+    let line = body.prepare(
+        1,
+        ENTRY_M,
+        [0.0, 0.0, 1.0],
+        active.force.bending.is_on(),
+        &[],
+        &mut || true,
+    )?;
 
     let entry = Vector3::from(ENTRY_M);
     let start = entry - Vector3::z() * RUN_UP.0;

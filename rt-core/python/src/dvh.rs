@@ -45,8 +45,8 @@ impl Dvh {
         self.0.mean_gy()
     }
 
-    /// Returns a metric: Gy for "D90", "D2cc", "Dmean", "Dmax", "Dmin"; % of the volume for "V150" (of the prescription)
-    /// and "V200Gy".
+    /// Returns a metric: Gy for "D90", "D2cc", "Dmean", "Dmax", "Dmin"; % of the volume for "V150" (of the
+    /// prescription) and "V200Gy".
     ///
     /// :raises ValueError: a name that is none; a structure smaller than the volume.
     fn metric(&self, name: &str, prescription_gy: f64) -> PyResult<f64> {

@@ -32,8 +32,8 @@ pub fn read_labels(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>>
 
 /// Reads a DICOM RT Plan of a permanent implant.
 ///
-/// :returns: a dict: ``seeds_mm`` and ``axes`` (NaN without one), shape (N, 3), patient frame (RAS); ``strength_u``, shape
-///     (N,); ``holes``, a list; ``source``, ``prescription_gy``, ``label``; ``notes``, remarks of the reader.
+/// :returns: a dict: ``seeds_mm`` and ``axes`` (NaN without one), shape (N, 3), patient frame (RAS); ``strength_u``,
+///     shape (N,); ``holes``, a list; ``source``, ``prescription_gy``, ``label``; ``notes``, remarks of the reader.
 /// :raises ValueError: what is wrong with the file.
 #[pyfunction]
 pub fn read_plan(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {

@@ -67,7 +67,7 @@ impl State {
             phase: Phase::from_number(state.phase).map_or("", Phase::name),
             punctures: needle.punctures,
             displacement_mm: mm(needle.tissue().displacement_m()),
-            seeds: state.seed_count,
+            seeds: needle.tissue().response().seed_count,
         }
     }
 }
@@ -251,12 +251,12 @@ impl Insertion {
         })
     }
 
-    /// Moves the tip along the axis to `depth_mm` at constant speed, and returns a trace of every millisecond: a dict of
-    /// arrays of N ticks.
+    /// Moves the tip along the axis to `depth_mm` at constant speed, and returns a trace of every millisecond: a dict
+    /// of arrays of N ticks.
     ///
-    /// ``time_s``, ``depth_mm``, ``resistance_n``, ``displacement_mm`` have the shape (N,), ``force_n`` (N, 3), ``terms_n``
-    /// (N, 5), all as in :class:`State`. ``phase`` (N,) has numbers: 0 outside, 1 membrane contraction, 2 penetration, 3
-    /// retraction, 4 hold.
+    /// ``time_s``, ``depth_mm``, ``resistance_n``, ``displacement_mm`` have the shape (N,), ``force_n`` (N, 3),
+    /// ``terms_n`` (N, 5), all as in :class:`State`. ``phase`` (N,) has numbers: 0 outside, 1 membrane contraction, 2
+    /// penetration, 3 retraction, 4 hold.
     ///
     /// :raises RuntimeError: as of :meth:`step`.
     #[pyo3(signature = (depth_mm, speed_mm_per_s=50.0))]
@@ -299,8 +299,8 @@ impl Insertion {
         })
     }
 
-    /// Returns the middles of the seeds, mm, and their axes, both of shape (N, 3), in the order of the drops: where they
-    /// rest once nothing moves the tissue, or with `at_rest=False` where they are now.
+    /// Returns the middles of the seeds, mm, and their axes, both of shape (N, 3), in the order of the drops: where
+    /// they rest once nothing moves the tissue, or with `at_rest=False` where they are now.
     #[pyo3(signature = (*, at_rest=true))]
     fn seeds<'py>(&self, py: Python<'py>, at_rest: bool) -> PyResult<(Table<'py>, Table<'py>)> {
         let seeds: Vec<SeedPose> = self.with(py, |needle| {

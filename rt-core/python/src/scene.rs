@@ -118,8 +118,8 @@ impl Scene {
     ///     tissue. Fortran order is read as it lies.
     /// :param spacing_mm: edges of a voxel. Unequal ones are resampled to cubes of the longest.
     /// :param structures: ``{label: name}`` or ``{label: {"name": ..., "role": "target" | "spare" | "tissue",
-    ///     "young_kpa": ..., "poisson": ..., "fixed": ...}}``. What is left out follows from the name (TG-263), as in the
-    ///     programs. Labels that are not named are left out. Without it all labels are one target.
+    ///     "young_kpa": ..., "poisson": ..., "fixed": ...}}``. What is left out follows from the name (TG-263), as in
+    ///     the programs. Labels that are not named are left out. Without it all labels are one target.
     /// :param origin_mm: centre of voxel [0, 0, 0] in the patient (RAS).
     /// :raises ValueError: with every problem of labels and materials.
     ///

@@ -21,8 +21,8 @@ pub fn sources() -> Vec<String> {
 
 /// Model of a seed with its tables of TG-43U1 (Rivard et al., Med. Phys. 31, 633, 2004).
 ///
-/// `Source("6711")`; :func:`sources` lists the models, :meth:`parse` takes a source file (``host-ui sources``). The dose is
-/// that of water everywhere, without shielding of one seed by another.
+/// `Source("6711")`; :func:`sources` lists the models, :meth:`parse` takes a source file (``host-ui sources``). The
+/// dose is that of water everywhere, without shielding of one seed by another.
 #[pyclass(frozen, module = "stylet")]
 pub struct Source {
     source: stylet_dose::Source,

@@ -18,9 +18,9 @@ use stylet_study::{Ended, Order, Progress, Study};
 /// :param jobs: threads; as many as there are cores without it.
 /// :returns: a dict. ``insertions`` has a column for each quantity, one value an insertion: texts as lists, numbers as
 ///     arrays of shape (N,), NaN and a text in ``failure`` where the insertion failed. ``seeds`` has one row for each
-///     seed: ``insertion``, the number of its row, of shape (M,), ``planned_mm``, ``rest_mm``, ``rest_axis`` of shape (M, 3),
-///     ``strength_u``, ``dropped_after_s`` of shape (M,). ``digest`` is the SHA-256 of all rows that the program prints;
-///     whatever the threads, the same study gives the same.
+///     seed: ``insertion``, the number of its row, of shape (M,), ``planned_mm``, ``rest_mm``, ``rest_axis`` of shape
+///     (M, 3), ``strength_u``, ``dropped_after_s`` of shape (M,). ``digest`` is the SHA-256 of all rows that the
+///     program prints; whatever the threads, the same study gives the same.
 /// :raises ValueError: everything that is wrong with study, plans or folder.
 ///
 /// >>> rows = stylet.study("paper.toml", "out/paper")

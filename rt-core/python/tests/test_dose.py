@@ -75,36 +75,34 @@ def test_a_histogram_of_a_ramp_is_a_line():
 
 
 def test_histograms_are_those_of_dicompyler(paper):
-    seeds_mm, axes, _ = example.implant(paper)
-    ours, theirs = example.histograms(paper, seeds_mm, axes)
+    seeds_mm, axes, strengths_u, _ = example.implant(paper)
+    ours, theirs = example.histograms(paper, seeds_mm, axes, strengths_u)
     figures = example.figures(ours, theirs)
     print(f"\n{figures}")
     # Half a bin of 0.5 Gy; V in % of the volume.
     for name, (mine, other) in figures.items():
         assert mine == pytest.approx(other, abs=0.5 if name == "D90" else 0.3), name
-    assert ours.metric("V100", example.PRESCRIPTION_GY) > 10.0, "there is a dose"
+    assert ours.metric("V100", example.PRESCRIPTION_GY) > 50.0, "there is a dose"
 
 
 def test_gamma_is_that_of_pymedphys():
     import pymedphys
 
-    source = stylet.Source("6711")
-    axes = [[0.0, 0.0, 1.0]] * 3
+    # Where a line is exact: the search is compared, not the interpolation, which is cubic here and linear there.
     grid = dict(origin_mm=(-15.0, -15.0, -10.0), spacing_mm=(1.5, 1.5, 2.5), shape=(21, 21, 9))
-    first = source.dose_grid(seeds_mm=[[0, 0, 0], [8, 2, 0], [-6, 7, 4]], strength_u=0.6, axes=axes, **grid)
-    other = source.dose_grid(seeds_mm=[[0.5, 0, 0], [8, 2.5, 0], [-6, 7, 4.5]], strength_u=0.61, axes=axes, **grid)
-    # Not next to seeds, where both interpolate between voxels that differ by half of their dose.
-    first, other = np.minimum(first, 200.0), np.minimum(other, 200.0)
-    ours = stylet.gamma(first, other, grid["spacing_mm"], origin_mm=grid["origin_mm"], of_gy=145.0, least_gy=29.0)
     edges = tuple(o + s * np.arange(n) for o, s, n in zip(*grid.values()))
+    x, y, z = np.meshgrid(*edges, indexing="ij")
+    first = 100.0 + 2.0 * x + 1.5 * y - 1.0 * z
+    other = 103.0 + 2.3 * x + 1.4 * y - 1.3 * z
+    ours = stylet.gamma(first, other, grid["spacing_mm"], origin_mm=grid["origin_mm"], of_gy=145.0, least_gy=29.0)
     theirs = pymedphys.gamma(
         edges, first, edges, other, 3, 3, lower_percent_dose_cutoff=20, global_normalisation=145.0, max_gamma=2,
-        interp_fraction=20, quiet=True,
+        interp_fraction=20,
     )
     both = ~np.isnan(ours) & ~np.isnan(theirs)
     assert both.sum() > 300
     off = np.abs(ours - theirs)[both]
-    print(f"\ngamma: {both.sum()} voxels, mean {np.nanmean(ours):.3f}; differences mean {off.mean():.4f}, largest {off.max():.3f}")
-    assert off.mean() < 0.02 and off.max() < 0.15
+    print(f"\ngamma in {both.sum()} voxels: differences mean {off.mean():.4f}, largest {off.max():.3f}")
+    assert off.mean() < 0.01 and off.max() < 0.05
     same = stylet.gamma(first, first, grid["spacing_mm"])
     assert np.nanmax(same) < 1e-9

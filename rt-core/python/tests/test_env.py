@@ -20,7 +20,8 @@ def straight(env, seed):
     rewards, over = [], False
     while not over:
         arrived = observation[2] > -0.5
-        observation, reward, terminated, truncated, info = env.step(np.array([0.0 if arrived else 1.0, 0.0, 1.0 if arrived else -1.0]))
+        action = np.array([0.0, 0.0, 1.0] if arrived else [1.0, 0.0, -1.0])
+        observation, reward, terminated, truncated, info = env.step(action)
         rewards.append(reward)
         over = terminated or truncated
     return rewards, info

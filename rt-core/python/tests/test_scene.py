@@ -1,11 +1,9 @@
 """Scenes by name, of arrays and of files; parameters."""
 
-import json
-
 import numpy as np
 import pytest
 import stylet
-from conftest import ENTRY_MM, ROOT, same_bits
+from conftest import ENTRY_MM, ROOT
 
 
 def test_built_in_scenes_have_structures_and_a_target():
@@ -32,11 +30,10 @@ def test_the_gland_of_the_paper_has_its_volume_in_points(paper):
 
 
 def test_an_array_gives_the_forces_of_the_scene_it_was_taken_from(paper):
-    copy = stylet.Scene.of_labels(
-        paper.labels, [paper.spacing_mm] * 3, {1: {"name": paper.structures[0].name, "role": "target"}},
-        origin_mm=[paper.spacing_mm / 2] * 3,
-    )
-    assert copy.structures[0].volume_cc == pytest.approx(paper.structures[0].volume_cc)
+    gland, edge_mm = paper.structures[0], paper.spacing_mm
+    named = {gland.label: {"name": gland.name, "role": "target", "young_kpa": gland.young_kpa}}
+    copy = stylet.Scene.of_labels(paper.labels, [edge_mm] * 3, named, origin_mm=[edge_mm / 2] * 3)
+    assert copy.structures[0].volume_cc == pytest.approx(gland.volume_cc)
     entry = copy.to_scene([ENTRY_MM])
     assert np.allclose(copy.to_patient(entry), ENTRY_MM)
     ours = stylet.Insertion(copy, entry[0]).move(40.0)["resistance_n"]
@@ -46,9 +43,9 @@ def test_an_array_gives_the_forces_of_the_scene_it_was_taken_from(paper):
 
 
 def test_materials_change_the_tissue(paper):
-    soft = stylet.Insertion(stylet.Scene("paper", stiffness=0.5), ENTRY_MM).move(20.0)
-    stiff = stylet.Insertion(paper, ENTRY_MM).move(20.0)
-    assert soft["displacement_mm"].max() > 1.2 * stiff["displacement_mm"].max()
+    soft = stylet.Insertion(stylet.Scene("paper", stiffness=0.5), ENTRY_MM, linear=True).move(45.0)
+    stiff = stylet.Insertion(paper, ENTRY_MM, linear=True).move(45.0)
+    assert soft["displacement_mm"][-1] > 1.3 * stiff["displacement_mm"][-1]
     labels = np.zeros((20, 20, 30), np.uint8)
     labels[4:16, 4:16, 4:26] = 1
     block = stylet.Scene.of_labels(labels, [2.0] * 3, {1: {"name": "Prostate", "young_kpa": 30.0}})
@@ -89,4 +86,4 @@ def test_parameters_are_the_table_of_the_programs():
     assert all(f'"{key}"' in table for key in rows) and len(rows) > 50
     depth = rows["needle.puncture_depth"]
     assert (depth.unit, depth.least, depth.default, depth.most) == ("mm", 0.5, 8.0, 20.0)
-    assert json.dumps(stylet.tissues())
+    assert list(stylet.tissues()) == ["chainmail", "fem", "paper"]

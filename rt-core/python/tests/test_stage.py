@@ -1,8 +1,8 @@
 """Rehearsals and studies: the bits of the programs."""
 
 import os
-import re
 import subprocess
+import tomllib
 
 import numpy as np
 import pytest
@@ -35,16 +35,12 @@ def test_a_needle_of_a_study_is_a_rehearsal(study, tmp_path):
     rows = stylet.study(study, tmp_path / "out", jobs=1)
     stage = stylet.Stage(stylet.Scene("paper"), linear=True)
     seeds = rows["seeds"]
-    entries = [re.findall(r"[\d.]+", line) for line in study.with_name("plan.toml").read_text().split("\n") if "entry_mm" in line]
-    assert len(entries) == 4
-    for number, entry in enumerate(entries):
+    needles = tomllib.loads(study.with_name("plan.toml").read_text())["needle"]
+    assert len(needles) == 4
+    for number, planned in enumerate(needles):
         mine = seeds["insertion"] == number
-        entry_mm = [float(word) for word in entry]
-        along = seeds["planned_mm"][mine][:, 2] - entry_mm[2]
-        pitch = 10.0 if len(along) > 2 else None
-        # The plan's own numbers: what is subtracted from a sum may differ in its last bit.
-        along = np.round(along, 6)
-        done = stage.rehearse(entry_mm, AXIS, list(along), strand_pitch_mm=pitch)
+        pitch = 4.5 + planned["spacer_mm"]
+        done = stage.rehearse(planned["entry_mm"], AXIS, planned["seed_along_mm"], strand_pitch_mm=pitch)
         assert same_bits(done.seeds_mm, seeds["rest_mm"][mine])
         assert same_bits(done.axes, seeds["rest_axis"][mine])
         assert same_bits(done.dropped_after_s, seeds["dropped_after_s"][mine])
@@ -59,8 +55,9 @@ def test_the_digest_is_that_of_any_threads_and_of_the_program(study, tmp_path):
     assert set(one["insertions"]["insert_mm_per_s"]) and len(set(one["insertions"]["insert_mm_per_s"])) == 4
     program = os.environ.get("STYLET_STUDY")
     if program is not None:
-        said = subprocess.run([program, "study", study, "--out", tmp_path / "program"], capture_output=True, text=True, check=True)
-        assert one["digest"] in said.stdout, said.stdout
+        command = [program, "study", study, "--out", tmp_path / "program"]
+        said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        assert one["digest"] in said, said
 
 
 def test_what_is_wrong_with_a_study_is_said_at_once(study, tmp_path):
@@ -81,7 +78,7 @@ def test_a_rehearsal_has_a_hand_and_limits(paper):
     assert not same_bits(usual.seeds_mm, heavy.seeds_mm)
     with pytest.raises(ValueError, match="deepest"):
         stage.rehearse(ENTRY_MM, AXIS, [35.0, 45.0])
-    with pytest.raises(ValueError, match="speed"):
+    with pytest.raises(ValueError, match="m/s is 5"):
         stage.rehearse(ENTRY_MM, AXIS, [35.0], insert_mm_per_s=5000.0)
     with pytest.raises(ValueError, match="hand"):
         stage.rehearse(ENTRY_MM, AXIS, [35.0], hand=(0.0, 5.0, 300.0))

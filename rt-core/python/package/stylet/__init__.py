@@ -1,7 +1,8 @@
-"""Stylet: a needle in soft tissue, and the dose of the seeds that it leaves there, without a device and without a clock.
+"""Stylet: a needle in soft tissue, and the dose of the seeds that it leaves there, without a device and without a
+clock.
 
-The programs of Stylet and this package run the same code: the same input gives the same bits. Lengths in mm, forces in N,
-times in s, doses in Gy, strengths in U; places in the frame of the scene. Not a medical device.
+The programs of Stylet and this package run the same code: the same input gives the same bits. Lengths in mm, forces in
+N, times in s, doses in Gy, strengths in U; places in the frame of the scene. Not a medical device.
 
 A needle, step by step::
 
@@ -24,8 +25,9 @@ Its dose::
     dose_gy = stylet.Source("6711").dose(points_mm, done.seeds_mm, strength_u=0.6, axes=done.axes)
     stylet.Dvh(dose_gy, volumes_cc).metric("D90", prescription_gy=145.0)
 
-`parameters()` lists what can be set, `scenes()`, `tissues()` and `sources()` the names. `study()` runs a population study.
-`stylet.env` has an environment for reinforcement learning (Gymnasium). ``help(stylet.Insertion)`` explains each step.
+`parameters()` lists what can be set, `scenes()`, `tissues()` and `sources()` the names. `study()` runs a population
+study. `stylet.env` has an environment for reinforcement learning (Gymnasium). ``help(stylet.Insertion)`` explains each
+step.
 """
 
 from . import _stylet

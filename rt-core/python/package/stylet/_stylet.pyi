@@ -8,6 +8,27 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __version__: str
+__all__ = [
+    "gamma",
+    "Dvh",
+    "read_dose",
+    "read_labels",
+    "read_plan",
+    "Insertion",
+    "State",
+    "Parameter",
+    "parameters",
+    "tissues",
+    "Scene",
+    "Structure",
+    "scenes",
+    "Source",
+    "sources",
+    "Rehearsed",
+    "Stage",
+    "study",
+    "__version__",
+]
 
 _Path = str | os.PathLike[str]
 _Three = tuple[float, float, float] | Sequence[float] | NDArray[np.float64]

@@ -39,16 +39,17 @@ class NeedleEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     Each episode draws a hole, and a target up to 1.5 mm beside its axis. It ends when the seed is dropped, or after
     `most_steps`.
 
-    **Action**, shape (3,), each -1 to 1: speed along the needle (times `speed_mm_per_s`), turn of the needle about itself
-    (times `turn_deg_per_s`), which steers it by its bevel, and drop the seed (above 0).
+    **Action**, shape (3,), each -1 to 1: speed along the needle (times `speed_mm_per_s`), turn of the needle about
+    itself (times `turn_deg_per_s`), which steers it by its bevel, and drop the seed (above 0).
 
-    **Observation**, shape (13,), ``float32``: the seed in the needle from the target, x y z [mm]; depth of the tip from the
-    entry [mm]; cosine and sine of the roll; force on the hand, x y z [N]; phase (0 outside, 0.25 membrane contraction, 0.5
-    penetration, 0.75 retraction, 1 hold); whether the membrane has given way; time used, 0 to 1; whether the seed is out.
+    **Observation**, shape (13,), ``float32``: the seed in the needle from the target, x y z [mm]; depth of the tip from
+    the entry [mm]; cosine and sine of the roll; force on the hand, x y z [N]; phase (0 outside, 0.25 membrane
+    contraction, 0.5 penetration, 0.75 retraction, 1 hold); whether the membrane has given way; time used, 0 to 1;
+    whether the seed is out.
 
     **Reward**: minus the distance [mm] from the target at which the seed comes to rest, when it is dropped; minus
-    `damage_per_j` for each joule that the hand puts into the tissue; minus `step_cost` a step; minus 20 for a seed that is
-    never dropped. A drop outside the tissue costs 1.
+    `damage_per_j` for each joule that the hand puts into the tissue; minus `step_cost` a step; minus 20 for a seed that
+    is never dropped. A drop outside the tissue costs 1.
 
     :param scene: name of a built-in scene, or a :class:`stylet.Scene`; needles go along +z.
     :param tissue: a name of :func:`stylet.tissues`.
