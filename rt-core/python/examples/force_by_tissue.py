@@ -19,17 +19,18 @@ NAMES = {"chainmail": "ChainMail", "fem": "finite elements", "paper": "as the pa
 def traces(scene: stylet.Scene):
     """Yields each tissue's name with its traces in and out."""
     for tissue in stylet.tissues():
-        # Newtons of the tissue, not of the device, which gives 0.9 of them.
-        needle = stylet.Insertion(scene, ENTRY_MM, tissue=tissue, parameters={"force.scale": 1.0})
+        # Newtons of the tissue, not of the device, which gives 0.9 of them. Forces are the same in linear tissue.
+        needle = stylet.Insertion(scene, ENTRY_MM, tissue=tissue, parameters={"force.scale": 1.0}, linear=True)
         yield tissue, needle.move(DEPTH_MM, SPEED_MM_PER_S), needle.move(0.0, SPEED_MM_PER_S)
 
 
 def main(path: str) -> None:
     figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
     for number, (tissue, inwards, outwards) in enumerate(traces(stylet.Scene("paper"))):
-        colour = f"C{number}"
-        axes.plot(inwards["depth_mm"], inwards["resistance_n"], color=colour, label=NAMES[tissue])
-        axes.plot(outwards["depth_mm"], outwards["resistance_n"], color=colour, linestyle=":")
+        # The first lies under the second: both slip by force.
+        style = {"color": f"C{number}", "linewidth": 4 if number == 0 else 1.5}
+        axes.plot(inwards["depth_mm"], inwards["resistance_n"], label=NAMES[tissue], **style)
+        axes.plot(outwards["depth_mm"], outwards["resistance_n"], linestyle=":", **style)
         print(f"{tissue:10} at most {inwards['resistance_n'].max():.2f} N inwards")
     axes.axhline(0.0, color="0.7", linewidth=0.8, zorder=0)
     axes.set(xlabel="depth from the entry, mm", ylabel="force against the needle, N")
