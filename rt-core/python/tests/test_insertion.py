@@ -1,6 +1,7 @@
 """A needle step by step: phases, seeds, refusals, and the bits of the same steps without Python."""
 
 import os
+import signal
 import threading
 import time
 
@@ -141,6 +142,14 @@ def test_what_is_wrong_is_said(paper, needle):
     with pytest.raises(ValueError, match="depth_mm, or tip_mm"):
         needle.step(1.0, tip_mm=ENTRY_MM)
     assert needle.step(1.0, 0.1).depth_mm == pytest.approx(1.0), "a refusal changes nothing"
+
+
+def test_ctrl_c_ends_a_long_move(needle):
+    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        needle.move(45.0, 0.1)
+    assert 0.0 < needle.state.depth_mm < 44.0
+    assert needle.reset().depth_mm == pytest.approx(0.0)
 
 
 def test_other_threads_run_during_a_long_move(needle):
