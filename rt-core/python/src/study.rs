@@ -11,6 +11,9 @@ use std::time::Duration;
 use stylet_insertions::{Insertion, MEASURED, Seed, Shard, Table, digest};
 use stylet_study::{Ended, Order, Progress, Study};
 
+type Text = (&'static str, fn(&Insertion) -> &str);
+type Whole = (&'static str, fn(&Insertion) -> i32);
+
 /// Runs a study file into a folder, and returns its rows.
 ///
 /// :param file: the study (TOML, as of ``rt-core study --help``), with plans relative to it.
@@ -60,7 +63,7 @@ fn into_dict<'py>(py: Python<'py>, table: &Table) -> PyResult<Bound<'py, PyDict>
 
 fn insertions<'py>(py: Python<'py>, table: &Table) -> PyResult<Bound<'py, PyDict>> {
     let columns = PyDict::new(py);
-    let texts: [(&str, fn(&Insertion) -> &str); 6] = [
+    let texts: [Text; 6] = [
         ("id", |row| &row.id),
         ("scene", |row| &row.scene),
         ("plan", |row| &row.plan),
@@ -71,7 +74,7 @@ fn insertions<'py>(py: Python<'py>, table: &Table) -> PyResult<Bound<'py, PyDict
     for (name, of) in texts {
         columns.set_item(name, table.rows.iter().map(of).collect::<Vec<_>>())?;
     }
-    let wholes: [(&str, fn(&Insertion) -> i32); 2] = [("implant", |row| row.implant), ("needle", |row| row.needle)];
+    let wholes: [Whole; 2] = [("implant", |row| row.implant), ("needle", |row| row.needle)];
     for (name, of) in wholes {
         columns.set_item(name, arrays::column(py, table.rows.iter().map(of).collect()))?;
     }
