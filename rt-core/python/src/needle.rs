@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use stylet_hw::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
 use stylet_runtime::lines::{LineBody, NoLine};
 use stylet_runtime::rehearse::RehearseError;
-use stylet_runtime::rt::exchange::{HapticOrder, Notice, TissueOrder, TissueStep};
+use stylet_runtime::rt::exchange::{HapticOrder, TissueOrder, TissueStep};
 use stylet_runtime::rt::haptic_tape::HapticMemory;
 use stylet_runtime::rt::world::World;
 use stylet_runtime::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
@@ -208,15 +208,7 @@ impl Needle {
         sample.sequence += 1;
         drop(sample);
         self.punctures += u32::from(self.loops.step().puncture);
-        let control = &mut self.loops.control;
-        while control.old_hand_lines.pop().is_ok() || control.old_body_lines.pop().is_ok() {}
-        for notices in [&mut control.haptic_notices, &mut control.tissue_notices] {
-            while let Ok(notice) = notices.pop() {
-                if let Notice::Refused { why, .. } = notice {
-                    self.refusal = Some(why);
-                }
-            }
-        }
+        self.refusal = self.loops.answers().or(self.refusal);
     }
 
     /// Leaves a seed at the tip, which rests until the tissue loop has taken it.

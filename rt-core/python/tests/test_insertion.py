@@ -105,7 +105,8 @@ def test_a_seed_moves_back_with_the_tissue_when_the_needle_goes(needle):
     now, rest = needle.seeds(at_rest=False), needle.seeds()
     assert rest[0].shape == rest[1].shape == (1, 3)
     assert np.allclose(np.linalg.norm(rest[1], axis=1), 1.0)
-    assert now[0][0, 2] == pytest.approx(ENTRY_MM[2] + 45.0 - 2.25, abs=4.0)
+    # The drawn tissue lacks the near field of a narrow tip (ADR 26): 0.2 N times some 11 mm/N.
+    assert 0.0 <= ENTRY_MM[2] + 45.0 - 2.25 - now[0][0, 2] < 3.0
     assert 0.2 < now[0][0, 2] - rest[0][0, 2] < 15.0, "the gland was pushed in"
     needle.move(0.0, 50.0)
     needle.step(dt_s=3.0)

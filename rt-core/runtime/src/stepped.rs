@@ -3,6 +3,7 @@
 //! Rehearsals, measurements and tests step the same `HapticLoop` and `TissueLoop` that a run drives from two threads.
 
 use crate::rt::clock::{HAPTIC_PERIOD_NS, TISSUE_PERIOD_NS};
+use crate::rt::exchange::Notice;
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
 use crate::rt::tissue::TissueLoop;
@@ -10,6 +11,7 @@ use crate::rt::tissue_tape::TissueTape;
 use crate::rt::wiring::{Capacities, ControlPorts, TapePorts, Wiring};
 use crate::rt::world::World;
 use stylet_hw::Device;
+use stylet_shm_schema::RefusalCode;
 use stylet_sim::force::chain::ChainOutput;
 
 /// Ticks of the force loop for each tick of the tissue loop, in a run.
@@ -81,6 +83,21 @@ impl SteppedLoops {
             self.missed = self.missed.saturating_sub(1);
         }
         output
+    }
+
+    /// Frees the lines that both loops gave back, drops their notices, and returns the last refusal among them.
+    pub fn answers(&mut self) -> Option<RefusalCode> {
+        let control = &mut self.control;
+        while control.old_hand_lines.pop().is_ok() || control.old_body_lines.pop().is_ok() {}
+        let mut refusal = None;
+        for notices in [&mut control.haptic_notices, &mut control.tissue_notices] {
+            while let Ok(notice) = notices.pop() {
+                if let Notice::Refused { why, .. } = notice {
+                    refusal = Some(why);
+                }
+            }
+        }
+        refusal
     }
 
     /// Skips the tissue loop's next ticks, as on a busy machine.

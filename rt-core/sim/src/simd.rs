@@ -43,7 +43,7 @@ impl Simd {
 /// `$portable`, or `$wide` where there is AVX2 or more.
 ///
 /// Nothing below it may be a closure: what is called from several places is not inlined, and only what is inlined is
-/// compiled for the instructions of its caller. `vector_instructions_are_no_calls` looks for them in the programs.
+/// compiled for the instructions of its caller. `vector_instructions_are_inlined` looks for calls in `rt-core`.
 macro_rules! dispatch {
     (
         $simd:ident, [$($generics:tt)*] [$($names:tt)*] [$($portable:tt)*] [$($wide:tt)*]

@@ -118,7 +118,7 @@ fn undisturbed(seconds: u32) {
     let mut child = start(&out, seconds, 100);
     child.wait().expect("ours");
     for outlier in &outliers(&out) {
-        // An injection counts as named where it comes first, too.
+        // The first cause counts, as for an injection.
         if let Some(cause) = outlier["causes"].get(0) {
             let who = cause["who"].as_str().expect("a name");
             let kind = cause["kind"].as_str().expect("a kind");

@@ -64,7 +64,7 @@ fn the_loops_keep_their_contract(options: &[&str], ticks: u64) {
 /// A closure between a kernel and its vectors is enough for an instruction to become a call, several times as slow.
 #[test]
 #[cfg(target_arch = "x86_64")]
-fn vector_instructions_are_no_calls() {
+fn vector_instructions_are_inlined() {
     let listing = std::process::Command::new("objdump")
         .args(["--disassemble", "--demangle", "--no-show-raw-insn"])
         .arg(stylet_test_kit::program("rt-core"))

@@ -1,6 +1,6 @@
 //! Drives the stepped loops in a rehearsal: a simulated device, orders, and refusals.
 
-use crate::rt::exchange::{HapticOrder, Notice, TissueOrder, TissueStep, hand_order};
+use crate::rt::exchange::{HapticOrder, TissueOrder, TissueStep, hand_order};
 use crate::rt::haptic_tape::HapticMemory;
 use crate::rt::world::World;
 use crate::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
@@ -102,15 +102,7 @@ impl Rig {
     pub fn tick(&mut self) -> bool {
         let tissue_tick = self.loops.tissue.response().tick;
         self.loops.step();
-        let control = &mut self.loops.control;
-        while control.old_hand_lines.pop().is_ok() || control.old_body_lines.pop().is_ok() {}
-        for notices in [&mut control.haptic_notices, &mut control.tissue_notices] {
-            while let Ok(notice) = notices.pop() {
-                if let Notice::Refused { why, .. } = notice {
-                    self.refusal = Some(why);
-                }
-            }
-        }
+        self.refusal = self.loops.answers().or(self.refusal);
         self.loops.tissue.response().tick != tissue_tick
     }
 

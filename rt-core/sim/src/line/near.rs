@@ -53,7 +53,7 @@ impl NearTip {
         let place = to_m.abs() / self.step_m;
         let at = place as usize;
         let pair = self.integral_m.get(at..).and_then(|rest| rest.get(..2));
-        // `fract` is a call where the processor may lack an instruction for it.
+        // Not `fract`, which is a call: not every processor that this is built for has an instruction for it.
         let size_m = pair.map_or(*last_m, |pair| pair[0] + (place - at as f64) * (pair[1] - pair[0]));
         size_m.copysign(to_m)
     }

@@ -288,8 +288,7 @@ fn narrow() -> LineModel {
     model
 }
 
-/// As above in tissue that a tip narrower than its patch dents deeper, with a wedge that opens the cut; it meets the
-/// inner membrane with that dent, and the membrane is a spring.
+/// As above for a [`narrow`] tip: it meets the inner membrane with its dent, and the membrane is a spring.
 #[test]
 fn a_narrow_tip_that_cuts_makes_no_energy() {
     let model = narrow();
