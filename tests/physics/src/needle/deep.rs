@@ -101,9 +101,9 @@ fn an_unfinished_puncture_is_reversible() {
         let more = 100.0 * (share(after) / share(direct) - 1.0);
         keep(&Row {
             number: 37,
-            case: "to 3 mm, and to 6 mm and back to 3 mm",
+            case: "to 3 mm; to 6 mm and back to 3 mm",
             model: kind.name(),
-            should: "as much displacement for each millimetre of the needle, to 5 %",
+            should: "displacement per millimetre of needle equal to 5 %",
             happened: format!(
                 "{:.2} mm with the tip at {:.2} mm, {:.2} mm at {:.2} mm: {more:+.1} %; {:.2} and {:.2} N",
                 direct.0 * 1e3,
@@ -252,10 +252,10 @@ fn a_closed_insertion_gives_the_hand_no_more_than_it_took() {
         }
         keep(&Row {
             number: 44,
-            case: "closed insertions, 6 and 45 mm deep, 10 to 123 mm/s in and out, a hand that yields to nothing",
+            case: "closed insertions: 6 and 45 mm deep, in and out at 10 to 123 mm/s; the hand does not yield",
             model: kind.name(),
-            should: "never more to the hand than 0.1 mJ beyond what it gave",
-            happened: format!("{}; never more than {:+.3} mJ", words.join(", "), most_j * 1e3),
+            should: "at most 0.1 mJ more to the hand than it gave",
+            happened: format!("{}; never more than {:+.3} mJ", words.join("; "), most_j * 1e3),
             met: most_j <= 1e-4,
             warning: "",
         });

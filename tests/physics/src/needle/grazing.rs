@@ -161,7 +161,7 @@ fn a_face_met_at_an_angle_is_felt_as_one_met_squarely() {
                 number: 40,
                 case,
                 model,
-                should: "membrane and rest as squarely to 10 %, force along the needle to 5 %, at most 0.5 N a tick, out again and at rest",
+                should: "membrane and rest as squarely to 10 %; force along the needle to 5 %; at most 0.5 N a tick; out again and at rest",
                 happened: format!(
                     "gives way at {:.2} N ({:.2} N squarely), {:.2} N at {:.1} mm ({:.2} N at {:.1} mm); across {:.1} %; largest step {:.3} N; {:.1} mm of displacement, {:.3} mm left",
                     found.held_n,
