@@ -3,4 +3,6 @@
 #[cfg(test)]
 mod docs_names;
 #[cfg(test)]
+mod features;
+#[cfg(test)]
 mod walls;

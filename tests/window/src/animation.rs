@@ -1,9 +1,8 @@
 //! The moving picture of the README: the example, moment by moment; `make animation` keeps it.
 
 use crate::driven::options_of;
-use egui_kittest::Harness;
+use crate::opened::{Harness, open_window};
 use egui_kittest::kittest::Queryable;
-use host_ui::app::App;
 use image::RgbaImage;
 use std::collections::HashMap;
 use std::path::Path;
@@ -21,7 +20,7 @@ const COLOURS: [usize; 2] = [160, 96];
 /// Height of the words over the picture, points.
 const BANNER: f32 = 36.0;
 
-fn steps(window: &mut Harness<'_, App>, count: usize) {
+fn steps(window: &mut Harness, count: usize) {
     for _ in 0..count {
         window.run_steps(1);
         std::thread::sleep(Duration::from_millis(10));
@@ -31,11 +30,7 @@ fn steps(window: &mut Harness<'_, App>, count: usize) {
 /// Returns each picture that differs from the one before.
 fn pictures() -> Vec<RgbaImage> {
     let alone = Alone(Instance::new("ui-animation").expect("a valid name"));
-    let options = options_of(alone.0.clone());
-    let mut window = Harness::builder()
-        .with_size(SIZE)
-        .wgpu()
-        .build_eframe(|cc| App::new(cc, options));
+    let mut window = open_window(SIZE, options_of(alone.0.clone()));
     steps(&mut window, 5);
     window.key_press(egui::Key::V);
     window.get_by_label("example").click();

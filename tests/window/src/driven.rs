@@ -1,8 +1,8 @@
 //! The real window on a separate core, drawn by the software driver and driven like by a person.
 
 use crate::kept::{assert_like_kept, tolerant, with_fewer_greys};
+use crate::opened::{Harness, open_window};
 use egui::accesskit::Role;
-use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable, by};
 use host_ui::app::{App, Options};
 use host_ui::view::orientation::Orientation;
@@ -17,7 +17,7 @@ pub fn is_at_rest(app: &App) -> bool {
 }
 
 pub struct Driven {
-    pub window: Harness<'static, App>,
+    pub window: Harness,
     pub core: Core,
 }
 
@@ -227,7 +227,7 @@ impl Driven {
 }
 
 /// Gives the window another size in pixels, with text of the size that follows from it.
-pub fn resize(window: &mut Harness<'_, App>, size: [f32; 2]) {
+pub fn resize(window: &mut Harness, size: [f32; 2]) {
     let fit = host_ui::text_scale(size.into());
     window.ctx.set_zoom_factor(fit);
     window.run_steps(1);
@@ -247,14 +247,8 @@ pub fn options_of(instance: Instance) -> Options {
 }
 
 /// Returns the window on a core that runs.
-pub fn window_on(instance: &Instance, size: [f32; 2]) -> Harness<'static, App> {
-    let options = options_of(instance.clone());
-    let fit = host_ui::text_scale(size.into());
-    let window = Harness::builder()
-        .with_size(egui::Vec2::from(size) / fit)
-        .with_pixels_per_point(fit)
-        .wgpu()
-        .build_eframe(|cc| App::new(cc, options));
+pub fn window_on(instance: &Instance, size: [f32; 2]) -> Harness {
+    let window = open_window(size, options_of(instance.clone()));
     // Steps without a picture draw nothing.
     App::draw_changes_only(&window.ctx, false);
     window
@@ -262,7 +256,7 @@ pub fn window_on(instance: &Instance, size: [f32; 2]) -> Harness<'static, App> {
 
 /// Draws the last frame at once, and compares it with the result of its changes to the previous
 /// frames.
-pub fn assert_drawn_by_changes<T>(window: &mut Harness<'static, T>, state: &str) {
+pub fn assert_drawn_by_changes(window: &mut Harness, state: &str) {
     let by_changes = window.render().expect("a picture");
     App::draw_all_again(&window.ctx);
     let at_once = window.render().expect("a picture");
@@ -293,7 +287,7 @@ pub fn keep_for_docs(picture: &image::RgbaImage, name: &str) {
 }
 
 /// Returns text and widgets outside the window, and pairs that overlap.
-pub fn misplaced(window: &Harness<'_, App>) -> Vec<String> {
+pub fn misplaced(window: &Harness) -> Vec<String> {
     use egui::accesskit::Role;
     let screen = window.ctx.content_rect();
     let roles = [

@@ -3,9 +3,9 @@
 
 use crate::driven::{Driven, misplaced, options_of};
 use crate::kept::{assert_like_kept, tolerant};
+use crate::opened::{Harness, open_window};
 use crate::plan::{SMALL, header, open, plan_through, put};
 use egui::Key;
-use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable, by};
 use host_ui::app::{App, Options};
 use serde_json::Value;
@@ -18,7 +18,7 @@ use stylet_shm_schema::{Class, ClassMember, Exercise, Relayed, Request, Text};
 use stylet_tests::{ask, scratch, until};
 
 /// Opens the window of an instructor who follows one trainee, on a live core.
-fn instructor(instance: &Instance, class: Option<PathBuf>) -> Harness<'static, App> {
+fn instructor(instance: &Instance, class: Option<PathBuf>) -> Harness {
     let options = Options {
         trainees: vec![Trainee {
             name: "Otto".to_owned(),
@@ -28,10 +28,7 @@ fn instructor(instance: &Instance, class: Option<PathBuf>) -> Harness<'static, A
         name: Some("Ina".to_owned()),
         ..options_of(instance.clone())
     };
-    let mut window = Harness::builder()
-        .with_size(SMALL)
-        .wgpu()
-        .build_eframe(|cc| App::new(cc, options));
+    let mut window = open_window(SMALL, options);
     App::draw_changes_only(&window.ctx, false);
     step_until(&mut window, "a live core", |window| {
         let link = window.state().link();
@@ -40,7 +37,7 @@ fn instructor(instance: &Instance, class: Option<PathBuf>) -> Harness<'static, A
     window
 }
 
-fn step_until(window: &mut Harness<'static, App>, what: &str, holds: impl Fn(&Harness<'static, App>) -> bool) {
+fn step_until(window: &mut Harness, what: &str, holds: impl Fn(&Harness) -> bool) {
     let begun = Instant::now();
     while !holds(window) {
         assert!(begun.elapsed() < Duration::from_secs(60), "waited in vain for {what}");
@@ -50,8 +47,8 @@ fn step_until(window: &mut Harness<'static, App>, what: &str, holds: impl Fn(&Ha
 }
 
 /// Returns the folder that the window reports as written, once that is another than `before`.
-fn saved(window: &mut Harness<'static, App>, before: Option<&Path>) -> PathBuf {
-    let reported = |window: &Harness<'static, App>| {
+fn saved(window: &mut Harness, before: Option<&Path>) -> PathBuf {
+    let reported = |window: &Harness| {
         let node = window.query_by_label_contains("Debrief saved as")?;
         let inner = node.accesskit_node();
         let words = inner.label().or(inner.value())?;
@@ -148,7 +145,7 @@ fn instructor_and_trainee_write_the_same_debrief() {
     std::fs::remove_dir_all(class).expect("ours");
 }
 
-fn compare(window: &mut Harness<'static, App>, name: &str) {
+fn compare(window: &mut Harness, name: &str) {
     assert_like_kept(name, &tolerant(), || {
         for _ in 0..20 {
             window.run_steps(1);
@@ -168,7 +165,7 @@ fn compare(window: &mut Harness<'static, App>, name: &str) {
 }
 
 /// Covers the texts that say how long ago something was, because they never repeat.
-fn cover_times(window: &mut Harness<'static, App>) {
+fn cover_times(window: &mut Harness) {
     let cover = |from: [f32; 2], to: [f32; 2]| egui::Rect::from_min_max(from.into(), to.into());
     let mut rects = vec![
         cover([120.0, 0.0], [SMALL[0] - 250.0, 33.0]),

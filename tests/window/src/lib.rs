@@ -15,6 +15,8 @@ mod kept;
 #[cfg(test)]
 mod live;
 #[cfg(test)]
+mod opened;
+#[cfg(test)]
 mod own_data;
 #[cfg(test)]
 mod plan;

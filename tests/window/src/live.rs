@@ -3,8 +3,8 @@
 //! Its picture is the README's; `make picture` keeps it.
 
 use crate::driven::{Driven, keep_for_docs, options_of};
+use crate::opened::open_window;
 use egui::accesskit::Role;
-use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use host_ui::app::App;
 use host_ui::view::orientation::Orientation;
@@ -72,11 +72,7 @@ fn a_new_window_moves_nothing() {
     let mut driven = Driven::open([1280.0, 800.0]);
     driven.plan_and_place();
     let tip = |app: &App| app.link().state().map(|s| s.tip_in_scene_m).expect("live");
-    let options = options_of(driven.core.instance.clone());
-    let mut second = Harness::builder()
-        .with_size([1280.0, 800.0])
-        .wgpu()
-        .build_eframe(|cc| App::new(cc, options));
+    let mut second = open_window([1280.0, 800.0], options_of(driven.core.instance.clone()));
     // The plan begins only now: a window that waits while another is made on its thread lets its
     // hand stop. A tip between two marks of the depth slider once made a new window pull it to the
     // nearest mark.

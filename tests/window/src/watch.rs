@@ -2,14 +2,13 @@
 //! again.
 
 use crate::driven::{misplaced, options_of};
-use egui_kittest::Harness;
+use crate::opened::{Harness, open_window};
 use egui_kittest::kittest::Queryable;
-use host_ui::app::App;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::Instance;
 use stylet_tests::Alone;
 
-fn until(window: &mut Harness<'_, App>, what: &str, mut holds: impl FnMut(&Harness<'_, App>) -> bool) {
+fn until(window: &mut Harness, what: &str, mut holds: impl FnMut(&Harness) -> bool) {
     let begun = Instant::now();
     while !holds(window) {
         assert!(begun.elapsed() < Duration::from_secs(120), "waited in vain for {what}");
@@ -21,24 +20,20 @@ fn until(window: &mut Harness<'_, App>, what: &str, mut holds: impl FnMut(&Harne
 #[test]
 fn the_example_opens_with_one_click_without_a_core_and_shows_an_insertion() {
     let alone = Alone(Instance::new("ui-watch").expect("a valid name"));
-    let options = options_of(alone.0.clone());
-    let mut window = Harness::builder()
-        .with_size([1280.0, 800.0])
-        .wgpu()
-        .build_eframe(|cc| App::new(cc, options));
+    let mut window = open_window([1280.0, 800.0], options_of(alone.0.clone()));
     window.run_steps(5);
     window.get_by_label("example").click();
     until(&mut window, "the recording", |window| {
         window.query_by_label("RECORDING").is_some()
     });
-    let seeds = |window: &Harness<'_, App>| window.state().link().snapshot().map_or(0, |s| s.header.seed_count);
+    let seeds = |window: &Harness| window.state().link().snapshot().map_or(0, |s| s.header.seed_count);
     until(&mut window, "the first seed", |window| seeds(window) == 1);
     assert!(window.query_by_label("The simulator core is not running").is_none());
     assert_eq!(misplaced(&window), Vec::<String>::new());
     // It is paused, and keys move nothing.
     window.get_by_label("Pause").click();
     window.run_steps(3);
-    let depth = |window: &Harness<'_, App>| window.state().link().state().map(|s| s.tip_in_scene_m);
+    let depth = |window: &Harness| window.state().link().state().map(|s| s.tip_in_scene_m);
     let before = depth(&window);
     window.key_press(egui::Key::Enter);
     for _ in 0..20 {

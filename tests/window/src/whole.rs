@@ -2,9 +2,8 @@
 
 use crate::driven::{assert_drawn_by_changes, misplaced, options_of};
 use crate::kept::tolerant;
-use egui_kittest::Harness;
+use crate::opened::{Harness, open_window};
 use egui_kittest::kittest::Queryable;
-use host_ui::app::App;
 use std::ops::{Deref, DerefMut};
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::PARAMETERS;
@@ -12,12 +11,12 @@ use stylet_tests::Alone;
 
 /// Window that closes before its files are deleted.
 struct Window {
-    harness: Harness<'static, App>,
+    harness: Harness,
     _alone: Alone,
 }
 
 impl Deref for Window {
-    type Target = Harness<'static, App>;
+    type Target = Harness;
 
     fn deref(&self) -> &Self::Target {
         &self.harness
@@ -36,20 +35,14 @@ fn window(instance: &str) -> Window {
 
 fn window_of(instance: &str, size: [f32; 2]) -> Window {
     let alone = Alone(Instance::new(instance).expect("a valid name"));
-    let options = options_of(alone.0.clone());
-    let fit = host_ui::text_scale(size.into());
     Window {
-        harness: Harness::builder()
-            .with_size(egui::Vec2::from(size) / fit)
-            .with_pixels_per_point(fit)
-            .wgpu()
-            .build_eframe(|cc| App::new(cc, options)),
+        harness: open_window(size, options_of(alone.0.clone())),
         _alone: alone,
     }
 }
 
 /// Steps the window a few times; it requests frames forever, so `run` would never end.
-fn settle(window: &mut Harness<'_, App>) {
+fn settle(window: &mut Harness) {
     window.run_steps(5);
 }
 

@@ -8,7 +8,9 @@ use super::whole::{STATES, State};
 use crate::app::App;
 use crate::app::watch::EXAMPLE;
 use crate::theme;
+use eframe::egui_wgpu::RendererOptions;
 use egui_kittest::Harness;
+use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state, default_wgpu_setup};
 use image::RgbaImage;
 use image::imageops::{FilterType, replace, resize};
 use std::path::PathBuf;
@@ -23,21 +25,6 @@ const SCALES: [f32; 3] = [1.0, 1.5, 2.0];
 /// Width of a picture on the sheet of all states.
 const ON_SHEET: u32 = 480;
 const SHEET_COLUMNS: u32 = 6;
-
-/// Window in a state, with tissue in its pictures.
-struct Posed {
-    app: App,
-    tissue: (Arc<SceneModel>, Box<Snapshot>),
-}
-
-impl eframe::App for Posed {
-    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
-        let (scene, snapshot) = &self.tissue;
-        let app = &mut self.app;
-        app.middle.take(&app.shown, Some(scene), Some(snapshot));
-        drop(app.frame_ui(ui));
-    }
-}
 
 /// Returns scene and last tissue of the example.
 fn tissue() -> (Arc<SceneModel>, Box<Snapshot>) {
@@ -64,17 +51,25 @@ fn picture(
     scene: Arc<SceneModel>,
     snapshot: Box<Snapshot>,
 ) -> RgbaImage {
+    let drawn_by = create_render_state(default_wgpu_setup(), RendererOptions::PREDICTABLE);
+    let mut created = None;
     let mut window = Harness::builder()
         .with_size(egui::Vec2::new(pixels[0] as f32, pixels[1] as f32) / scale)
         .with_pixels_per_point(scale)
-        .wgpu()
-        .build_eframe(|cc| {
-            let mut app = App::new(cc, options());
-            pose(&mut app);
-            Posed {
-                app,
-                tissue: (scene, snapshot),
-            }
+        .renderer(WgpuTestRenderer::from_render_state(drawn_by.clone()))
+        .build_ui(move |ui| {
+            let ctx = ui.ctx().clone();
+            let app = created.get_or_insert_with(|| {
+                let mut cc = eframe::CreationContext::_new_kittest(ctx.clone());
+                cc.wgpu_render_state = Some(drawn_by.clone());
+                let mut app = App::new(&cc, options());
+                pose(&mut app);
+                app
+            });
+            app.middle.take(&app.shown, Some(&scene), Some(&snapshot));
+            // The harness's own `Ui` has a margin.
+            let whole = egui::UiBuilder::new().max_rect(ctx.content_rect());
+            drop(app.frame_ui(&mut egui::Ui::new(ctx, egui::Id::unique("window"), whole)));
         });
     theme::apply(&window.ctx);
     window
