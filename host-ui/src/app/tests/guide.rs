@@ -2,7 +2,7 @@
 
 use super::fixture::{live, one_needle};
 use crate::panel::workflow::{MetMembranes, lesson};
-use crate::shown::Shown;
+use crate::shown::{NeedleLine, Shown};
 use bytemuck::Zeroable;
 use stylet_implant::plan::Template;
 use stylet_implant::workflow::default_plan;
@@ -35,6 +35,18 @@ fn the_guide_follows_the_state_machine() {
         }
         let what = what(&shown, &membranes);
         assert!(what.contains(word), "{word:?} is not in {what:?}");
+    }
+}
+
+/// Guards against "preparing line 37 s" before anything was planned.
+#[test]
+fn a_line_is_prepared_only_for_a_placed_needle() {
+    for (shown, line) in [
+        (live(), None),
+        (one_needle(-0.05, 0), None),
+        (one_needle(0.0, 0), Some(NeedleLine::Preparing)),
+    ] {
+        assert_eq!(shown.needle_line(), line, "at {:?} m", shown.path_depth_m());
     }
 }
 
