@@ -30,6 +30,7 @@ impl App {
         let plan_before = self.shown.plan.map(|p| p.generation);
         let scene_before = self.shown.scene.map(|s| s.id());
         let given_up_before = self.shown.given_up_at;
+        let session_before = self.shown.session.map(|s| s.session_id);
         self.shown.take(&self.link);
         if self.shown.scene.map(|s| s.id()) != scene_before {
             // The file of another scene's plan is not replaced by this one's.
@@ -55,7 +56,7 @@ impl App {
             self.history.sum_up();
         }
         self.take_controllers();
-        self.take_answers();
+        self.take_answers(self.shown.session.map(|s| s.session_id) != session_before);
         self.take_scene_file();
         self.advance_run();
         self.take_given_up(given_up_before);
@@ -142,8 +143,8 @@ impl App {
         }
     }
 
-    fn take_answers(&mut self) {
-        if self.shown.is_absent() {
+    fn take_answers(&mut self, is_another_core: bool) {
+        if self.shown.is_absent() || is_another_core {
             self.parameters.forget();
             self.waiting.clear();
             self.drive.forget();
