@@ -47,6 +47,7 @@ impl App {
             Ok(id) => {
                 (self.files.scene_to_come, self.files.image_to_come) = (None, None);
                 self.files.uploading = Some((id, name.to_owned()));
+                self.files.begins_outside = true;
                 LoadState::Sending(format!("building {name}"))
             }
         };

@@ -109,6 +109,12 @@ fn a_core_that_was_killed_is_started_again_by_a_click() {
     driven.click("1  Choose the scene");
     driven.click("pelvis");
     driven.until("the other scene", is_pelvis);
+    driven.until("the needle before the other body", |app| {
+        let scene = app.link().scene().expect("live");
+        app.link()
+            .state()
+            .is_some_and(|s| s.tip_in_scene_m[2] < scene.header.lower_m[2] - 0.025)
+    });
     let run = |app: &App| app.link().session().map(|session| session.session_id);
     let first = run(driven.window.state());
     driven.core.kill_only();
