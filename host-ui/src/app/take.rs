@@ -65,6 +65,9 @@ impl App {
         self.advance_run();
         self.take_given_up(given_up_before);
         self.take_plan();
+        if let (Some(scene), Some(snapshot)) = (self.link.scene(), self.link.snapshot()) {
+            self.shown.take_places(scene, snapshot);
+        }
         self.dose.take(self.link.scene(), &self.dose_request());
         self.shown.dose = self.dose.latest().cloned();
         self.shown.dose_trouble = self.dose.trouble();

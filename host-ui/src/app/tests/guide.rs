@@ -1,8 +1,8 @@
 //! The guide against the state machine of the procedure, and its figures against their state.
 
-use super::fixture::{live, one_needle};
+use super::fixture::{Drawn, live, one_needle};
 use crate::panel::workflow::{MetMembranes, lesson};
-use crate::shown::{NeedleLine, Shown};
+use crate::shown::{NeedleLine, Outside, Shown};
 use bytemuck::Zeroable;
 use stylet_implant::plan::Template;
 use stylet_implant::workflow::default_plan;
@@ -146,6 +146,26 @@ fn the_headline_names_the_worst_seed_and_a_fault() {
         what.starts_with("A fault turned the force off: ") && what.ends_with(expected),
         "{what}"
     );
+}
+
+#[test]
+fn a_seed_outside_the_gland_is_named_until_the_debrief() {
+    let mut shown = one_needle(0.03, 1);
+    shown.seed_places.places = vec![Some(Outside::Past(12e-3))];
+    let place = "dropped outside the gland, 12.0 mm past it";
+    let notes = |shown: &Shown| lesson(shown, &MetMembranes::default()).notes.join("\n");
+    let during = notes(&shown);
+    assert!(
+        during.contains(&format!("The last seed was {place}. Ctrl+Z")),
+        "{during}"
+    );
+    let mut drawn = Drawn::new([1280.0, 800.0], 1.0);
+    drawn.app.shown = shown;
+    drawn.place(&format!("Seed 1 {place}"));
+    let mut after = one_needle(0.0, 5);
+    after.seed_places.places = vec![Some(Outside::Past(12e-3)), None, None, None, None];
+    let after = notes(&after);
+    assert_eq!(after.matches(place).count(), 1, "{after}");
 }
 
 #[test]

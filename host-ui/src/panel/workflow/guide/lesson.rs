@@ -2,7 +2,7 @@
 
 use super::membranes::{MetMembranes, Puncture};
 use crate::panel::workflow::progress::{Progress, needle_at_hand, progress};
-use crate::shown::{NeedleLine, SeedError, Shown, own_errors};
+use crate::shown::{NeedleLine, Outside, SeedError, Shown, own_errors};
 use crate::words::counted;
 use stylet_base::format;
 use stylet_procedure::{AtHand, Operation};
@@ -69,7 +69,14 @@ fn next_lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
             &["Rings in the pictures show where the seeds should come to rest."],
         ),
         (Progress::Debrief, _) => debrief(shown, membranes),
-        (_, Some((needle, operation))) => operation_lesson(shown, membranes, &needle, operation),
+        (_, Some((needle, operation))) => {
+            let mut lesson = operation_lesson(shown, membranes, &needle, operation);
+            let outside = shown.last_outside();
+            lesson
+                .notes
+                .extend(outside.map(|place| format!("The last seed was {place}. Ctrl+Z takes it back.")));
+            lesson
+        }
         (_, None) => of("Press Enter for the next needle.", &[]),
     }
 }
@@ -182,6 +189,7 @@ struct Depths {
     left_m: f64,
     rests_m: f64,
     across_m: f64,
+    outside: Option<Outside>,
 }
 
 impl Depths {
@@ -212,6 +220,7 @@ impl Depths {
 }
 
 fn depths(shown: &Shown) -> Vec<Depths> {
+    let needle = shown.planning.at_work().map_or(0, |(number, _)| number);
     let of_seed = |row: SeedError| {
         let seed = shown.own_seeds().get(row.placed?)?;
         let rests_m = shown.depth_of_m(seed.position_m)?;
@@ -221,6 +230,7 @@ fn depths(shown: &Shown) -> Vec<Depths> {
             left_m: shown.depth_of_m(seed.dropped_at_m)?,
             rests_m,
             across_m: row.across_m,
+            outside: shown.outside(needle, &row),
         })
     };
     own_errors(shown).into_iter().filter_map(of_seed).collect()
@@ -241,12 +251,13 @@ fn debrief(shown: &Shown, membranes: &MetMembranes) -> Lesson {
     let mut notes: Vec<String> = membranes.punctures().iter().map(pressed).collect();
     notes.extend(seeds.iter().take(SEEDS).map(|seed| {
         format!(
-            "Seed {}: planned {} deep, dropped at {}, came to rest at {}, {} off axis.",
+            "Seed {}: planned {} deep, dropped at {}, came to rest at {}, {} off axis{}.",
             seed.number,
             format::length(seed.planned_m),
             format::length(seed.left_m),
             format::length(seed.rests_m),
-            format::length(seed.across_m)
+            format::length(seed.across_m),
+            seed.outside.map_or_else(String::new, |place| format!("; {place}"))
         )
     }));
     notes.push(match by_tissue_m.abs() >= by_hand_m.abs() {
