@@ -47,6 +47,7 @@ impl App {
             Ok(id) => {
                 (self.files.scene_to_come, self.files.image_to_come) = (None, None);
                 self.files.uploading = Some((id, name.to_owned()));
+                self.files.begins_outside = true;
                 LoadState::Sending(format!("building {name}"))
             }
         };
@@ -149,7 +150,10 @@ impl App {
             }
             Action::LoadScene(path) => self.load(&path, None),
             Action::LoadImage(path) => self.load_image(&path),
-            Action::CancelLoad => self.cancel_load(),
+            Action::CancelLoad => {
+                self.loader.cancel();
+                self.shown.load = LoadState::Idle;
+            }
             Action::Structures(action) => self.act_on_structures(action),
             Action::PickFile(purpose) => self.pick_file(purpose),
             Action::StopRun => self.stop_run(),
@@ -231,15 +235,6 @@ impl App {
             };
             self.send(what, &Request::SetPlan(Some(withdrawn)));
         }
-    }
-
-    /// Cancels the reading of a file. A file that is already being sent is left to the core, and
-    /// its answer is ignored.
-    fn cancel_load(&mut self) {
-        self.loader.cancel();
-        self.files.uploading = None;
-        self.files.image_to_come = None;
-        self.shown.load = LoadState::Idle;
     }
 
     /// Pulls the tip by hand: at most one goal a frame, and no goal twice.

@@ -13,14 +13,13 @@ const PROGRAM: &str = "rt-core";
 /// Its messages. A pipe would end with the window, and the core on its next message.
 const LOG: &str = "out/rt-core.log";
 
-/// Core that ends with the window, unless the window crashes: then it runs on, and the next window finds it.
+/// Core that ends with the window, however the window ends: no force stays on without a window to turn it off.
 #[derive(Debug)]
 pub struct StartedCore(Child);
 
 impl Drop for StartedCore {
     fn drop(&mut self) {
-        let has_ended = !matches!(self.0.try_wait(), Ok(None));
-        if !has_ended && !std::thread::panicking() {
+        if matches!(self.0.try_wait(), Ok(None)) {
             // SAFETY: the child is ours and has not been waited for, so its number is still its own.
             unsafe { libc::kill(self.0.id() as libc::pid_t, libc::SIGTERM) };
         }
@@ -36,7 +35,12 @@ impl App {
             self.files.first_scene = Some(scene);
         }
         let started = Command::new(&program)
-            .args(["--instance", &self.shown.instance, "--rt-if-allowed"])
+            .args([
+                "--instance",
+                &self.shown.instance,
+                "--rt-if-allowed",
+                "--exit-with-parent",
+            ])
             .stdin(Stdio::null())
             .stderr(log().map_or_else(|_| Stdio::inherit(), Stdio::from))
             .process_group(0)

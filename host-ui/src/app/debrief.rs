@@ -12,11 +12,11 @@ use stylet_dose::{DoseKernel, Seed, Source};
 use stylet_host::link::{Link, SceneModel};
 use stylet_host::moments::Moment;
 use stylet_implant::intraoperative::Reviewed;
-use stylet_implant::plan::{Anatomy, Hole, ImplantPlan, exchange, file};
+use stylet_implant::plan::{Anatomy, Hole, ImplantPlan, Template, exchange, file};
 use stylet_implant::provenance;
 use stylet_implant::received::ReceivedProcedure;
 use stylet_implant::score::{self, Implant, Motion, Score, SeedPair, seed_of};
-use stylet_shm_schema::{Prescribed, TickRecord};
+use stylet_shm_schema::{Prescribed, Text, TickRecord};
 
 /// Folder that was written, or the reason why it could not be.
 pub(super) type Saved = Result<PathBuf, Failure>;
@@ -77,9 +77,27 @@ impl App {
     }
 
     pub(super) fn save_plan(&mut self, folder: &Path) {
-        if self.shown.planning.implant.is_some() && std::fs::create_dir_all(folder).is_ok() {
-            self.planner.export(folder.join("plan.toml"), self.scene_file());
+        let by_hand = self.plan_by_hand();
+        let has_plan = by_hand.is_some() || self.shown.planning.implant.is_some();
+        if has_plan && std::fs::create_dir_all(folder).is_ok() {
+            let file = folder.join("plan.toml");
+            self.planner.export(file, self.scene_file(), by_hand);
         }
+    }
+
+    /// Returns the plan of one needle by hand.
+    fn plan_by_hand(&self) -> Option<ImplantPlan> {
+        let plan = self.shown.plan.filter(|_| self.shown.is_one_needle_by_hand())?;
+        let known = self.planned_as();
+        let (source, dose_gy) = source_of(&known.source.read(), known.dose_gy).ok()?;
+        let mut needle = plan.needle();
+        needle.prescribed = Prescribed {
+            dose_gy,
+            source: Text::new(&source.model),
+            ..known
+        };
+        let template = Template::before(self.shown.scene.as_ref()?);
+        Some(ImplantPlan::of_one_needle(&needle, template))
     }
 
     pub(super) fn save_seeds(&mut self, folder: PathBuf) {

@@ -87,7 +87,7 @@ impl App {
             }
             PlanAction::Export(path) => {
                 self.workflow.plan.own_file = Some(path.clone());
-                planner.export(path, scene_file);
+                planner.export(path, scene_file, None);
             }
             PlanAction::ExportStudy => {
                 if let Some(scene) = self.link.scene() {

@@ -15,10 +15,13 @@ use std::time::{Duration, Instant};
 use stylet_controllers::Button;
 use stylet_files::{Image, LabelVolume};
 use stylet_host::core_args::SceneChoice;
-use stylet_implant::workflow::RunStatus;
-use stylet_shm_schema::{Prescribed, Request};
+use stylet_implant::plan::Template;
+use stylet_implant::workflow::{RunStatus, move_request};
+use stylet_shm_schema::{Prescribed, Request, flags};
 
 const SUM_UP_EVERY: Duration = Duration::from_millis(500);
+/// Distance from the template at which the needle begins in another scene.
+const BEFORE_TEMPLATE_M: f64 = 0.02;
 /// Time after which a request without an answer is shown.
 const ANSWER_WITHIN: Duration = Duration::from_secs(3);
 
@@ -30,10 +33,12 @@ impl App {
         let plan_before = self.shown.plan.map(|p| p.generation);
         let scene_before = self.shown.scene.map(|s| s.id());
         let given_up_before = self.shown.given_up_at;
+        let session_before = self.shown.session.map(|s| s.session_id);
         self.shown.take(&self.link);
         if self.shown.scene.map(|s| s.id()) != scene_before {
             // The file of another scene's plan is not replaced by this one's.
             self.workflow.plan.forget_file();
+            self.begin_outside();
         }
         self.leave_core();
         self.take_core();
@@ -55,11 +60,14 @@ impl App {
             self.history.sum_up();
         }
         self.take_controllers();
-        self.take_answers();
+        self.take_answers(self.shown.session.map(|s| s.session_id) != session_before);
         self.take_scene_file();
         self.advance_run();
         self.take_given_up(given_up_before);
         self.take_plan();
+        if let (Some(scene), Some(snapshot)) = (self.link.scene(), self.link.snapshot()) {
+            self.shown.take_places(scene, snapshot);
+        }
         self.dose.take(self.link.scene(), &self.dose_request());
         self.shown.dose = self.dose.latest().cloned();
         self.shown.dose_trouble = self.dose.trouble();
@@ -68,6 +76,20 @@ impl App {
         self.take_debrief();
         self.take_trainees();
         self.middle.take(&self.shown, self.link.scene(), self.link.snapshot());
+    }
+
+    /// Moves a simulated needle in front of the template of a scene that this window has loaded: at its place in the
+    /// last scene it would lie in the new body.
+    fn begin_outside(&mut self) {
+        let begins = std::mem::take(&mut self.files.begins_outside) && self.shown.has_flag(flags::SIMULATED_DEVICE);
+        let Some(scene) = self.shown.scene.filter(|_| begins) else {
+            return;
+        };
+        let Template { middle_m, inwards, .. } = Template::before(&scene);
+        let start_m = [0, 1, 2].map(|a| middle_m[a] - inwards[a] * BEFORE_TEMPLATE_M);
+        let pace = &self.pace;
+        let request = move_request(start_m, inwards, pace.approach_m_per_s, pace.acceleration_m_per_s2);
+        self.send("Needle", &request);
     }
 
     /// Leaves the force loop's processor core to it.
@@ -142,13 +164,13 @@ impl App {
         }
     }
 
-    fn take_answers(&mut self) {
-        if self.shown.is_absent() {
+    fn take_answers(&mut self, is_another_core: bool) {
+        if self.shown.is_absent() || is_another_core {
             self.parameters.forget();
             self.waiting.clear();
             self.drive.forget();
             if self.files.uploading.take().is_some() {
-                self.files.image_to_come = None;
+                (self.files.image_to_come, self.files.begins_outside) = (None, false);
                 self.shown.load = LoadState::Refused("rt-core ended before it replied".to_owned());
             }
             return;
@@ -180,6 +202,7 @@ impl App {
             self.files.uploading = None;
             let image = self.files.image_to_come.take();
             if let Err(why) = answer {
+                self.files.begins_outside = false;
                 self.shown.load = LoadState::Refused(format!("{name} refused: {why}"));
                 return;
             }
@@ -187,7 +210,7 @@ impl App {
             if self.files.structures.take().is_some() {
                 self.workflow.open_present();
             }
-            self.shown.load = LoadState::Loaded(format!("{name} is the scene now"));
+            self.shown.load = LoadState::Loaded(format!("{name} is loaded"));
             if let Some((image, scene)) = image {
                 self.show_image(image, &scene);
             }
@@ -301,6 +324,7 @@ impl App {
             Ok(id) => {
                 let text = format!("sending {}", volume.name);
                 self.files.uploading = Some((id, name));
+                self.files.begins_outside = true;
                 LoadState::Sending(text)
             }
         };

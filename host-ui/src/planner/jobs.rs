@@ -178,10 +178,10 @@ impl Planner {
         });
     }
 
-    /// Starts to write the plan to a file.
-    pub fn export(&mut self, path: PathBuf, scene_file: Option<PathBuf>) {
+    /// Starts to write the plan to a file, or `by_hand` if there is no plan of many needles.
+    pub fn export(&mut self, path: PathBuf, scene_file: Option<PathBuf>, by_hand: Option<ImplantPlan>) {
         self.begin_job("Writing the plan", |planner, outlines| {
-            let plan = planner.planned()?.clone();
+            let plan = by_hand.map_or_else(|| planner.planned().cloned(), Ok)?;
             Ok(move |_: &Reporter<'_>| {
                 exchange::write(&path, &plan, &outlines.frames, scene_file.as_deref())?;
                 Ok(JobMessage::End(format!("Plan saved as {}", path.display())))

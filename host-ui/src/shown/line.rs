@@ -1,13 +1,14 @@
 //! State of the needle's line, and how long its preparation takes.
 
 use super::Shown;
+use stylet_procedure::tolerance::{PLACED_BEFORE_M, PLACED_WITHIN_M};
 use stylet_shm_schema::flags;
 
 /// Preparation of the tissue for the needle at its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NeedleLine {
     Ready,
-    /// The needle is outside.
+    /// The needle is placed, and still outside.
     Preparing,
     /// The needle is in tissue without one.
     Missing,
@@ -58,19 +59,25 @@ impl LineWait {
 }
 
 impl Shown {
-    /// Returns the state of the line; `None` if the tissue needs none, and while the hand holds no
-    /// needle.
+    /// Returns the state of the line; `None` if the tissue needs none, while the hand holds no
+    /// needle, and before the needle is placed.
     pub fn needle_line(&self) -> Option<NeedleLine> {
-        let needs_one = self.has_flag(flags::LINE_NEEDED) && !self.has_flag(flags::HAND_EMPTY);
-        needs_one.then(|| {
-            if self.has_flag(flags::LINE_READY) {
-                NeedleLine::Ready
-            } else if self.has_flag(flags::IN_CONTACT) {
-                NeedleLine::Missing
-            } else {
-                NeedleLine::Preparing
-            }
-        })
+        if !self.has_flag(flags::LINE_NEEDED) || self.has_flag(flags::HAND_EMPTY) {
+            None
+        } else if self.has_flag(flags::LINE_READY) {
+            Some(NeedleLine::Ready)
+        } else if self.has_flag(flags::IN_CONTACT) {
+            Some(NeedleLine::Missing)
+        } else {
+            self.is_placed().then_some(NeedleLine::Preparing)
+        }
+    }
+
+    /// Returns whether the tip is on the planned path, at its entry or deeper.
+    fn is_placed(&self) -> bool {
+        let beside_m = self.off_path_m().unwrap_or(f64::INFINITY);
+        let depth_m = self.path_depth_m().unwrap_or(f64::NEG_INFINITY);
+        beside_m <= PLACED_WITHIN_M && depth_m >= -PLACED_BEFORE_M
     }
 
     pub(super) fn take_line_wait(&mut self) {

@@ -3,6 +3,7 @@
 mod bend;
 mod line;
 mod metal;
+mod outside;
 mod parts;
 mod second;
 mod seeds;
@@ -13,6 +14,8 @@ use crate::planner::Planning;
 pub use bend::Bend;
 pub use line::{LineWait, NeedleLine};
 use nalgebra::Vector3;
+pub use outside::Outside;
+use outside::SeedPlaces;
 pub use parts::{FrameCost, LoadState, TipOnPath, Watched};
 pub use second::{SecondHand, Stepper};
 pub use seeds::{SeedError, all_errors, own_errors};
@@ -48,6 +51,7 @@ pub struct Shown {
     pub plan: Option<PlanInForce>,
     pub parameters: Option<ParametersInForce>,
     pub seeds: Vec<SeedPose>,
+    pub seed_places: SeedPlaces,
     /// Planned seeds, from the plans in force that were received.
     pub heard: Vec<ReceivedSeed>,
     /// Number of seeds that the last reset removed, until another is dropped.

@@ -5,11 +5,13 @@
 use crate::driven::{Driven, keep_for_docs, options_of};
 use crate::opened::open_window;
 use egui::accesskit::Role;
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use host_ui::app::App;
 use host_ui::view::orientation::Orientation;
 use nalgebra::Vector3;
+use std::path::Path;
 use std::time::Duration;
+use stylet_implant::plan::file;
 use stylet_shm_schema::{Phase, flags};
 use stylet_surfaces::field::Field;
 
@@ -103,6 +105,12 @@ fn a_core_that_was_killed_is_started_again_by_a_click() {
     driven.click("1  Choose the scene");
     driven.click("pelvis");
     driven.until("the other scene", is_pelvis);
+    driven.until("the needle before the other body", |app| {
+        let scene = app.link().scene().expect("live");
+        app.link()
+            .state()
+            .is_some_and(|s| s.tip_in_scene_m[2] < scene.header.lower_m[2] - 0.025)
+    });
     let run = |app: &App| app.link().session().map(|session| session.session_id);
     let first = run(driven.window.state());
     driven.core.kill_only();
@@ -127,6 +135,28 @@ fn a_core_that_was_killed_is_started_again_by_a_click() {
             .query_by_label("The simulator core is not running")
             .is_none()
     );
+    // It must end with a window that is killed.
+    let pid = driven.window.state().link().session().expect("live").pid;
+    let asked = std::fs::read_to_string(format!("/proc/{pid}/cmdline")).expect("it runs");
+    assert!(asked.contains("--exit-with-parent"), "{asked}");
+}
+
+#[test]
+fn the_plan_of_one_needle_is_saved_when_the_core_ends() {
+    let mut driven = Driven::open_plain([1280.0, 800.0]);
+    driven.click("Plan five seeds");
+    driven.until("the plan", |app| app.link().plan().is_some_and(|p| p.seed_count == 5));
+    driven.core.kill_only();
+    let said = "Plan saved as ";
+    driven.wait_for_label(said);
+    let label = driven.window.get_by_label_contains(said);
+    let node = label.accesskit_node();
+    let text = node.label().or(node.value()).expect("a text");
+    let file = Path::new(&text[text.find(said).expect("the file") + said.len()..]);
+    let frame = driven.window.state().link().scene().expect("kept").header.patient();
+    let plan = file::read(file, &frame).expect("a plan");
+    std::fs::remove_dir_all(file.parent().expect("a folder")).expect("removed");
+    assert_eq!((plan.needles.len(), plan.seed_count()), (1, 5));
 }
 
 #[test]

@@ -336,7 +336,7 @@ fn inwards(template: &Template, axis: [f64; 3]) -> [f64; 3] {
 
 /// Returns the needle through a place, from the template's face; through a hole if one is on the
 /// line.
-fn through(template: &Template, place_m: [f64; 3], direction: [f64; 3]) -> Needle {
+pub(super) fn through(template: &Template, place_m: [f64; 3], direction: [f64; 3]) -> Needle {
     let (place, inwards, along) = (
         Vector3::from(place_m),
         Vector3::from(template.inwards),

@@ -46,6 +46,22 @@ pub struct ImplantPlan {
 }
 
 impl ImplantPlan {
+    /// Returns the plan of one needle.
+    pub fn of_one_needle(planned: &PlannedNeedle, template: Template) -> Self {
+        let needle = file::through(&template, planned.entry_m, planned.direction);
+        let seed = |place_m: &[f64; 3]| NeedleSeed {
+            along_m: needle.along_m(*place_m),
+            strength_u: planned.prescribed.strength_u,
+        };
+        let seeds = planned.seeds_m.iter().map(seed).collect();
+        Self {
+            template,
+            source: planned.prescribed.source.read(),
+            prescription_gy: planned.prescribed.dose_gy,
+            needles: vec![Needle { seeds, ..needle }.in_order()],
+        }
+    }
+
     /// Returns the number of seeds of all needles.
     pub fn seed_count(&self) -> usize {
         self.needles.iter().map(|n| n.seeds.len()).sum()

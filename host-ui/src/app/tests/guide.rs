@@ -1,8 +1,8 @@
 //! The guide against the state machine of the procedure, and its figures against their state.
 
-use super::fixture::{live, one_needle};
+use super::fixture::{Drawn, live, one_needle};
 use crate::panel::workflow::{MetMembranes, lesson};
-use crate::shown::Shown;
+use crate::shown::{NeedleLine, Outside, Shown};
 use bytemuck::Zeroable;
 use stylet_implant::plan::Template;
 use stylet_implant::workflow::default_plan;
@@ -35,6 +35,18 @@ fn the_guide_follows_the_state_machine() {
         }
         let what = what(&shown, &membranes);
         assert!(what.contains(word), "{word:?} is not in {what:?}");
+    }
+}
+
+/// Guards against "preparing line 37 s" before anything was planned.
+#[test]
+fn a_line_is_prepared_only_for_a_placed_needle() {
+    for (shown, line) in [
+        (live(), None),
+        (one_needle(-0.05, 0), None),
+        (one_needle(0.0, 0), Some(NeedleLine::Preparing)),
+    ] {
+        assert_eq!(shown.needle_line(), line, "at {:?} m", shown.path_depth_m());
     }
 }
 
@@ -88,7 +100,7 @@ fn the_debrief_has_the_figures_of_the_seeds_and_of_the_membrane() {
     let lesson = lesson(&one_needle(0.0, 5), &membranes);
     for word in [
         "2.2 mm from plan on average",
-        "2.2 mm off: the tissue took it 2.0 mm inwards.",
+        "2.2 mm off: the tissue carried it 2.0 mm deeper.",
     ] {
         assert!(lesson.what.contains(word), "{}", lesson.what);
     }
@@ -103,7 +115,7 @@ fn the_debrief_has_the_figures_of_the_seeds_and_of_the_membrane() {
     ] {
         assert!(notes.contains(word), "{word:?} is not in {notes}");
     }
-    assert!(notes.contains("Most of it is the tissue"));
+    assert!(notes.contains("Most of the error comes from the tissue"));
     // The next insertion starts from zero.
     membranes.take(&[tick(1e-3, 0.0, flags::IN_CONTACT)]);
     assert!(membranes.punctures().is_empty());
@@ -121,8 +133,8 @@ fn the_headline_names_the_worst_seed_and_a_fault() {
     }
     let mut membranes = MetMembranes::default();
     let what = lesson(&shown, &membranes).what;
-    let expected = "The seeds rest 4.4 mm from plan on average; the worst is seed 1, 9.9 mm off: the tissue took it 8.8 mm \
-                    outwards.";
+    let expected = "The seeds rest 4.4 mm from plan on average; the worst is seed 1, 9.9 mm off: the tissue carried it 8.8 \
+                    mm shallower.";
     assert_eq!(what, expected);
     let mut record = TickRecord::zeroed();
     record.flags = flags::IN_CONTACT;
@@ -134,6 +146,26 @@ fn the_headline_names_the_worst_seed_and_a_fault() {
         what.starts_with("A fault turned the force off: ") && what.ends_with(expected),
         "{what}"
     );
+}
+
+#[test]
+fn a_seed_outside_the_gland_is_named_until_the_debrief() {
+    let mut shown = one_needle(0.03, 1);
+    shown.seed_places.places = vec![Some(Outside::Past(12e-3))];
+    let place = "dropped outside the gland, 12.0 mm past it";
+    let notes = |shown: &Shown| lesson(shown, &MetMembranes::default()).notes.join("\n");
+    let during = notes(&shown);
+    assert!(
+        during.contains(&format!("The last seed was {place}. Ctrl+Z")),
+        "{during}"
+    );
+    let mut drawn = Drawn::new([1280.0, 800.0], 1.0);
+    drawn.app.shown = shown;
+    drawn.place(&format!("Seed 1 {place}"));
+    let mut after = one_needle(0.0, 5);
+    after.seed_places.places = vec![Some(Outside::Past(12e-3)), None, None, None, None];
+    let after = notes(&after);
+    assert_eq!(after.matches(place).count(), 1, "{after}");
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Parts that stay in place while others appear or disappear.
 
 use super::fixture::{Drawn, live, many_needles, one_needle};
-use crate::shown::{Note, Shown};
+use crate::panel::workflow::Progress;
+use crate::shown::{LoadState, Note, Shown};
 use egui::Rect;
 use stylet_shm_schema::{Fault, flags};
 
@@ -47,4 +48,20 @@ fn a_run_of_needles_moves_no_step() {
     let mut stopped = many_needles(19, 2);
     stopped.continues_at = Some((1, 19));
     assert_eq!(places(stopped, &names), without);
+}
+
+/// Guards against a button that left the core building the scene.
+#[test]
+fn only_the_reading_of_a_file_can_be_cancelled() {
+    let mut drawn = Drawn::new([1280.0, 720.0], 1.0);
+    drawn.app.shown = live();
+    drawn.frame();
+    drawn.app.workflow.open_by_hand(Progress::Scene);
+    for (load, can_cancel) in [
+        (LoadState::Reading("case7.nrrd: reading voxels".to_owned(), 0.5), true),
+        (LoadState::Sending("building pelvis".to_owned()), false),
+    ] {
+        drawn.app.shown.load = load;
+        assert_eq!(drawn.frame().place("Cancel").is_some(), can_cancel);
+    }
 }

@@ -128,7 +128,7 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
     ui.horizontal(|ui| {
         ui.label(theme::strong("Seed error, mm"))
             .explained("error of a seed")
-            .on_hover_text("Present position of the seed relative to plan; along is positive inwards");
+            .on_hover_text("Present position of the seed relative to plan; along the needle, deeper is positive");
         let placed = rows.iter().map(|(_, row)| row).filter(|r| r.placed.is_some());
         let placed: Vec<f64> = placed.map(total_m).collect();
         if let Some(text) = mean_and_worst(&placed) {
@@ -139,6 +139,12 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
     let touching = (0..shown.seeds.len()).filter(touch).count();
     if touching > 0 {
         ui.label(theme::small(format!("{touching} seeds touch a neighbour")));
+    }
+    for (needle, row) in rows {
+        if let Some(place) = shown.outside(*needle, row) {
+            let text = format!("Seed {} {place}", number_of(has_many.then_some(*needle), row));
+            ui.label(RichText::new(text).small().color(theme::of(ui).warn));
+        }
     }
     // The list is last and does not scroll by itself, so that the wheel moves the whole panel.
     ui.spacing_mut().interact_size.y = 16.0;
@@ -164,8 +170,7 @@ fn total_m(row: &SeedError) -> f64 {
 
 /// Draws one seed, with the number of its needle if there are many.
 fn seed_row_ui(ui: &mut egui::Ui, needle: Option<usize>, row: &SeedError) {
-    let number = row.planned + 1;
-    ui.label(needle.map_or_else(|| number.to_string(), |n| format!("{}.{number}", n + 1)));
+    ui.label(number_of(needle, row));
     if row.placed.is_some() {
         ui.monospace(format::signed_mm(row.along_m));
         ui.monospace(format!("{:.2}", format::mm(row.across_m)));
@@ -176,6 +181,11 @@ fn seed_row_ui(ui: &mut egui::Ui, needle: Option<usize>, row: &SeedError) {
         ui.label("");
     }
     ui.end_row();
+}
+
+fn number_of(needle: Option<usize>, row: &SeedError) -> String {
+    let number = row.planned + 1;
+    needle.map_or_else(|| number.to_string(), |n| format!("{}.{number}", n + 1))
 }
 
 #[cfg(test)]

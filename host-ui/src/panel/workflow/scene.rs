@@ -1,7 +1,7 @@
 //! The first step: the scene.
 
 use super::WorkflowState;
-use super::job::job_ui;
+use super::job::{job_ui, waiting_ui};
 use crate::action::{Action, WatchAction};
 use crate::dialog::Purpose;
 use crate::panel::field::path_ui;
@@ -136,7 +136,8 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
     match &shown.load {
         LoadState::Idle => {}
         LoadState::Reading(what, share) => cancel = job_ui(ui, what, Some(*share)),
-        LoadState::Sending(what) => cancel = job_ui(ui, what, None),
+        // The core does not interrupt the building of a scene.
+        LoadState::Sending(what) => drop(ui.horizontal(|ui| waiting_ui(ui, what))),
         LoadState::Loaded(what) => {
             ui.label(RichText::new(what).small().color(tokens.good));
         }

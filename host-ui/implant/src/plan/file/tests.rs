@@ -57,6 +57,16 @@ fn same(a: &ImplantPlan, b: &ImplantPlan) {
 }
 
 #[test]
+fn the_plan_of_one_needle_is_that_needle() {
+    let mut whole = plan();
+    whole.needles.truncate(1);
+    let needle = whole.planned(0).expect("a needle");
+    let one = ImplantPlan::of_one_needle(&needle, whole.template);
+    same(&one, &whole);
+    assert_eq!((&*one.source, one.prescription_gy), ("6711", 145.0));
+}
+
+#[test]
 fn a_plan_round_trip_keeps_the_patient_frame() {
     let text = to_text(&plan(), &frames()).unwrap();
     // The scene's z is the patient's -y: the needle goes posterior.

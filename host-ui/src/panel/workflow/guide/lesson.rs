@@ -2,7 +2,7 @@
 
 use super::membranes::{MetMembranes, Puncture};
 use crate::panel::workflow::progress::{Progress, needle_at_hand, progress};
-use crate::shown::{NeedleLine, SeedError, Shown, own_errors};
+use crate::shown::{NeedleLine, Outside, SeedError, Shown, own_errors};
 use crate::words::counted;
 use stylet_base::format;
 use stylet_procedure::{AtHand, Operation};
@@ -46,8 +46,7 @@ pub fn lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
 
 fn next_lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
     if !shown.is_live() {
-        let why =
-            "The window shows what the core computes; it may be closed and opened again without the core noticing.";
+        let why = "The window shows what the core computes. A core started here ends with the window; one in a terminal continues.";
         return of(
             "Start the simulator core: press \"Start it\" above the pictures, or run rt-core in a terminal.",
             &[why],
@@ -70,7 +69,14 @@ fn next_lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
             &["Rings in the pictures show where the seeds should come to rest."],
         ),
         (Progress::Debrief, _) => debrief(shown, membranes),
-        (_, Some((needle, operation))) => operation_lesson(shown, membranes, &needle, operation),
+        (_, Some((needle, operation))) => {
+            let mut lesson = operation_lesson(shown, membranes, &needle, operation);
+            let outside = shown.last_outside();
+            lesson
+                .notes
+                .extend(outside.map(|place| format!("The last seed was {place}. Ctrl+Z takes it back.")));
+            lesson
+        }
         (_, None) => of("Press Enter for the next needle.", &[]),
     }
 }
@@ -183,6 +189,7 @@ struct Depths {
     left_m: f64,
     rests_m: f64,
     across_m: f64,
+    outside: Option<Outside>,
 }
 
 impl Depths {
@@ -204,8 +211,8 @@ impl Depths {
                 format!("it was dropped {} too {way}", format::length(parts[0]))
             }
             Some(1) => {
-                let way = if is_inwards(by_tissue_m) { "inwards" } else { "outwards" };
-                format!("the tissue took it {} {way}", format::length(parts[1]))
+                let way = if is_inwards(by_tissue_m) { "deeper" } else { "shallower" };
+                format!("the tissue carried it {} {way}", format::length(parts[1]))
             }
             _ => format!("it lies {} off axis", format::length(self.across_m)),
         }
@@ -213,6 +220,7 @@ impl Depths {
 }
 
 fn depths(shown: &Shown) -> Vec<Depths> {
+    let needle = shown.planning.at_work().map_or(0, |(number, _)| number);
     let of_seed = |row: SeedError| {
         let seed = shown.own_seeds().get(row.placed?)?;
         let rests_m = shown.depth_of_m(seed.position_m)?;
@@ -222,6 +230,7 @@ fn depths(shown: &Shown) -> Vec<Depths> {
             left_m: shown.depth_of_m(seed.dropped_at_m)?,
             rests_m,
             across_m: row.across_m,
+            outside: shown.outside(needle, &row),
         })
     };
     own_errors(shown).into_iter().filter_map(of_seed).collect()
@@ -242,29 +251,32 @@ fn debrief(shown: &Shown, membranes: &MetMembranes) -> Lesson {
     let mut notes: Vec<String> = membranes.punctures().iter().map(pressed).collect();
     notes.extend(seeds.iter().take(SEEDS).map(|seed| {
         format!(
-            "Seed {}: planned {} deep, dropped at {}, came to rest at {}, {} off axis.",
+            "Seed {}: planned {} deep, dropped at {}, came to rest at {}, {} off axis{}.",
             seed.number,
             format::length(seed.planned_m),
             format::length(seed.left_m),
             format::length(seed.rests_m),
-            format::length(seed.across_m)
+            format::length(seed.across_m),
+            seed.outside.map_or_else(String::new, |place| format!("; {place}"))
         )
     }));
     notes.push(match by_tissue_m.abs() >= by_hand_m.abs() {
         true => format!(
-            "Most of it is the tissue: the needle had moved it, and as it went back it took the seeds along, by {} mm on \
-             average. The hand left them {} mm from their places.",
+            "Most of the error comes from the tissue: as the needle left, it went back and carried the seeds {} mm along on \
+             average. The hand dropped them {} mm from their planned places.",
             format::signed_mm(by_tissue_m),
             format::signed_mm(by_hand_m)
         ),
         false => format!(
-            "Most of it is the hand: the seeds were left {} mm from their planned places on average. The tissue took them \
-             {} mm along.",
+            "Most of the error comes from the hand: it dropped the seeds {} mm from their planned places on average. The \
+             tissue carried them {} mm along.",
             format::signed_mm(by_hand_m),
             format::signed_mm(by_tissue_m)
         ),
     });
-    notes.push("\"Compensate\" in a plan of many needles shifts the drop positions to compensate.".to_owned());
+    notes.push(
+        "In a plan of many needles, \"Compensate\" shifts the drops so that the seeds come to rest on plan.".to_owned(),
+    );
     Lesson {
         what: headline(shown, membranes, &seeds),
         notes,
