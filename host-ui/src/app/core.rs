@@ -13,13 +13,14 @@ const PROGRAM: &str = "rt-core";
 /// Its messages. A pipe would end with the window, and the core on its next message.
 const LOG: &str = "out/rt-core.log";
 
-/// Core that ends with the window, however the window ends: no force stays on without a window to turn it off.
+/// Core that ends with the window, unless the window crashes: then it runs on, and the next window finds it.
 #[derive(Debug)]
 pub struct StartedCore(Child);
 
 impl Drop for StartedCore {
     fn drop(&mut self) {
-        if matches!(self.0.try_wait(), Ok(None)) {
+        let has_ended = !matches!(self.0.try_wait(), Ok(None));
+        if !has_ended && !std::thread::panicking() {
             // SAFETY: the child is ours and has not been waited for, so its number is still its own.
             unsafe { libc::kill(self.0.id() as libc::pid_t, libc::SIGTERM) };
         }
@@ -35,12 +36,7 @@ impl App {
             self.files.first_scene = Some(scene);
         }
         let started = Command::new(&program)
-            .args([
-                "--instance",
-                &self.shown.instance,
-                "--rt-if-allowed",
-                "--exit-with-parent",
-            ])
+            .args(["--instance", &self.shown.instance, "--rt-if-allowed"])
             .stdin(Stdio::null())
             .stderr(log().map_or_else(|_| Stdio::inherit(), Stdio::from))
             .process_group(0)

@@ -46,7 +46,8 @@ pub fn lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
 
 fn next_lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
     if !shown.is_live() {
-        let why = "The window shows what the core computes. A core started here ends with the window; one in a terminal continues.";
+        let why =
+            "The window shows what the core computes; it may be closed and opened again without the core noticing.";
         return of(
             "Start the simulator core: press \"Start it\" above the pictures, or run rt-core in a terminal.",
             &[why],
