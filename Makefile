@@ -11,7 +11,7 @@ COMPRESSED = --features stylet-files/compressed
 PACKAGED = $(COMPRESSED) --features host-ui/screen-reader
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: animation attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release reproducible sbom package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures python python-test clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: animation attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release reproducible sbom libraries package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures python python-test clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -143,6 +143,9 @@ live-test: build live ## Watch 'host-ui record --live' for LIVE_SECONDS (60) wit
 	@docs/tools/need python3-venv
 	python3 -m venv $(BIN)/live-client && $(BIN)/live-client/bin/pip install -q websockets==17.4
 	docs/tools/live-test "$(BIN)" $(BIN)/live-client/bin/python $(or $(LIVE_SECONDS),60)
+
+libraries: ## Package stylet-sim, stylet-dose and what they need, and build a program outside of the workspace from the packages (minutes)
+	docs/tools/libraries $(abspath $(BIN))/../libraries
 
 # In a target folder of its own: other features of what both build would build it twice.
 PYTHON = $(abspath $(BIN)/../python)

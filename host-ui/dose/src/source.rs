@@ -35,9 +35,9 @@ pub struct Source {
 
 /// Sources that need no file.
 const KNOWN: [&str; 3] = [
-    include_str!("../../../sources/i125_6711.toml"),
-    include_str!("../../../sources/i125_iai125a.toml"),
-    include_str!("../../../sources/pd103_200.toml"),
+    include_str!("../sources/i125_6711.toml"),
+    include_str!("../sources/i125_iai125a.toml"),
+    include_str!("../sources/pd103_200.toml"),
 ];
 
 impl Source {

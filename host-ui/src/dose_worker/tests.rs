@@ -70,7 +70,7 @@ fn the_shell_of_a_seed_lies_where_the_formula_gives_that_dose() {
     let (scene, poses) = (scene(), [pose(0.02)]);
     let mut worker = DoseWorker::default();
     let picture = wait(&mut worker, &scene, &poses);
-    let source = Source::parse(include_str!("../../../sources/i125_6711.toml")).expect("checked in");
+    let source = Source::parse(include_str!("../../dose/sources/i125_6711.toml")).expect("checked in");
     let kernel = DoseKernel::new(&source, Interval::ALL);
     let shell = &picture.shells[0];
     assert!(!shell.points_m.is_empty());
