@@ -72,7 +72,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         for name in metrics {
             let metric = Metric::parse(name)?;
             let value = metric.of(&dvh, PRESCRIPTION_GY).main().unwrap_or(f64::NAN);
-            println!("  {name:5} {value:7.1} {}", metric.unit());
+            let unit = if metric.unit() == "gy" { "Gy" } else { "%" };
+            println!("  {name:5} {value:7.1} {unit}");
         }
     }
     Ok(())
