@@ -53,7 +53,7 @@ pub const KEYS: [(&str, &str); 26] = [
         "left button moves the cross, or the needle by its tip; right button pans",
     ),
     (
-        "Drag in the probe's",
+        "Drag in ultrasound",
         "in, out and a turn; in fluoroscopy turns the C-arm",
     ),
     ("Wheel in a slice", "through the slices; with Ctrl zooms"),

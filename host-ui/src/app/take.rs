@@ -210,7 +210,7 @@ impl App {
             if self.files.structures.take().is_some() {
                 self.workflow.open_present();
             }
-            self.shown.load = LoadState::Loaded(format!("{name} is the scene now"));
+            self.shown.load = LoadState::Loaded(format!("{name} is loaded"));
             if let Some((image, scene)) = image {
                 self.show_image(image, &scene);
             }

@@ -205,9 +205,11 @@ fn without_line(shown: &Shown) -> Option<Banner> {
             lag_s * 1e3,
             stylet_base::format::length(lag_m)
         ),
-        None => "The tissue was not prepared for this needle: its force follows the paper's law, and its seeds may rest up to 2 cm \
+        None => {
+            "The tissue was not prepared for this needle: its force is approximate, and its seeds may rest up to 2 cm \
                  from plan. Withdraw it, and wait for LINE READY."
-            .to_owned(),
+                .to_owned()
+        }
     };
     is_missing.then(|| Banner::new(BannerLevel::Warn, "No needle line", text))
 }

@@ -165,19 +165,19 @@ fn line_ui(ui: &mut egui::Ui, shown: &Shown) {
         Some(NeedleLine::Ready) => (
             "LINE READY",
             tokens.good,
-            "The tissue is prepared for the needle where it is: friction, membranes and tissue are solved together.",
+            "The tissue along the needle is computed: the insertion can begin.",
         ),
         Some(NeedleLine::Preparing) => (
             preparing.trim_end(),
             tokens.warn,
-            "rt-core solves for the tissue along the needle: seconds waited, of those that the last line took. Hold the needle before its \
+            "The tissue along the needle is being computed: seconds waited, of those that the last one took. Hold the needle at its \
              entry until this says LINE READY.",
         ),
         Some(NeedleLine::Missing) => (
             "NO LINE",
             tokens.bad,
-            "The needle went in before the tissue was prepared for it: it is felt by the paper's force law, and its seeds \
-             may rest up to 2 cm from plan. Withdraw it, and wait for LINE READY.",
+            "The needle went in before the tissue along it was computed: its force is approximate, and its seeds may rest up \
+             to 2 cm from plan. Withdraw it, and wait for LINE READY.",
         ),
     };
     badge(ui, word, color)

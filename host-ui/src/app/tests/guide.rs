@@ -100,7 +100,7 @@ fn the_debrief_has_the_figures_of_the_seeds_and_of_the_membrane() {
     let lesson = lesson(&one_needle(0.0, 5), &membranes);
     for word in [
         "2.2 mm from plan on average",
-        "2.2 mm off: the tissue took it 2.0 mm inwards.",
+        "2.2 mm off: the tissue carried it 2.0 mm deeper.",
     ] {
         assert!(lesson.what.contains(word), "{}", lesson.what);
     }
@@ -115,7 +115,7 @@ fn the_debrief_has_the_figures_of_the_seeds_and_of_the_membrane() {
     ] {
         assert!(notes.contains(word), "{word:?} is not in {notes}");
     }
-    assert!(notes.contains("Most of it is the tissue"));
+    assert!(notes.contains("Most of the error comes from the tissue"));
     // The next insertion starts from zero.
     membranes.take(&[tick(1e-3, 0.0, flags::IN_CONTACT)]);
     assert!(membranes.punctures().is_empty());
@@ -133,8 +133,8 @@ fn the_headline_names_the_worst_seed_and_a_fault() {
     }
     let mut membranes = MetMembranes::default();
     let what = lesson(&shown, &membranes).what;
-    let expected = "The seeds rest 4.4 mm from plan on average; the worst is seed 1, 9.9 mm off: the tissue took it 8.8 mm \
-                    outwards.";
+    let expected = "The seeds rest 4.4 mm from plan on average; the worst is seed 1, 9.9 mm off: the tissue carried it 8.8 \
+                    mm shallower.";
     assert_eq!(what, expected);
     let mut record = TickRecord::zeroed();
     record.flags = flags::IN_CONTACT;

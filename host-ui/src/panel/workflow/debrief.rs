@@ -128,7 +128,7 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
     ui.horizontal(|ui| {
         ui.label(theme::strong("Seed error, mm"))
             .explained("error of a seed")
-            .on_hover_text("Present position of the seed relative to plan; along is positive inwards");
+            .on_hover_text("Present position of the seed relative to plan; along the needle, deeper is positive");
         let placed = rows.iter().map(|(_, row)| row).filter(|r| r.placed.is_some());
         let placed: Vec<f64> = placed.map(total_m).collect();
         if let Some(text) = mean_and_worst(&placed) {

@@ -15,7 +15,7 @@ use crate::recent::Recent;
 use crate::shown::{Note, SeedError, Shown, own_errors};
 use crate::theme;
 use crate::theme::Press;
-use crate::words::counted;
+use crate::words::{counted, sentence};
 use egui::text::LayoutJob;
 use egui::{Align2, Button, FontId, RichText, Sense, Stroke, TextStyle, Vec2};
 pub use guide::Guide;
@@ -190,7 +190,7 @@ fn step_ui(
         head_ui(ui, (step, now), shown);
         let blocked = missing(shown, step);
         match &blocked {
-            Some(why) => drop(ui.label(RichText::new(format!("Missing: {why}.")).color(tokens.warn))),
+            Some(why) => drop(ui.label(RichText::new(sentence(why)).color(tokens.warn))),
             // Details follow below.
             None if step == Progress::Plan && shown.planning.implant.is_some() => {}
             None if step == Progress::Debrief => {}
@@ -219,7 +219,7 @@ fn what(step: Progress, shown: &Shown) -> String {
         Progress::Plan => "Five seeds along one needle through the gland.".to_owned(),
         Progress::Place => {
             let which = plan::at_work(shown).map_or_else(String::new, |text| text + " ");
-            format!("{which}Bring the tip to the entry, along the path.")
+            format!("{which}Bring the tip to the entry of the planned path.")
         }
         Progress::Insert => "To the deepest planned seed: the button, W and S, or drag the tip in a slice.".to_owned(),
         Progress::Drop => {

@@ -12,9 +12,9 @@ impl FluoroView {
     pub fn tools_ui(&mut self, ui: &mut egui::Ui) {
         let beam = ui.toggle_value(&mut self.is_switched_on, "X-ray");
         beam.on_hover_text("Key X while held: 8 pulses a second; afterwards the last image is held");
-        let hint = "Ctrl with left, right: the detector about the patient, to his left";
+        let hint = "Ctrl with left, right: turns the detector to the patient's left or right";
         angle_ui(ui, "Orbital", ORBITAL_DEG, hint, &mut self.angles.orbital);
-        let hint = "Ctrl with up, down: the detector towards his head";
+        let hint = "Ctrl with up, down: tilts the detector towards the head or feet";
         angle_ui(ui, "Cranial", CRANIAL_DEG, hint, &mut self.angles.cranial);
         let hint = "Sets the dose to zero and clears the screen; another scene does so too";
         if Press("New case", hint).ui(ui, true) {

@@ -211,8 +211,8 @@ impl Depths {
                 format!("it was dropped {} too {way}", format::length(parts[0]))
             }
             Some(1) => {
-                let way = if is_inwards(by_tissue_m) { "inwards" } else { "outwards" };
-                format!("the tissue took it {} {way}", format::length(parts[1]))
+                let way = if is_inwards(by_tissue_m) { "deeper" } else { "shallower" };
+                format!("the tissue carried it {} {way}", format::length(parts[1]))
             }
             _ => format!("it lies {} off axis", format::length(self.across_m)),
         }
@@ -262,19 +262,21 @@ fn debrief(shown: &Shown, membranes: &MetMembranes) -> Lesson {
     }));
     notes.push(match by_tissue_m.abs() >= by_hand_m.abs() {
         true => format!(
-            "Most of it is the tissue: the needle had moved it, and as it went back it took the seeds along, by {} mm on \
-             average. The hand left them {} mm from their places.",
+            "Most of the error comes from the tissue: as the needle left, it went back and carried the seeds {} mm along on \
+             average. The hand dropped them {} mm from their planned places.",
             format::signed_mm(by_tissue_m),
             format::signed_mm(by_hand_m)
         ),
         false => format!(
-            "Most of it is the hand: the seeds were left {} mm from their planned places on average. The tissue took them \
-             {} mm along.",
+            "Most of the error comes from the hand: it dropped the seeds {} mm from their planned places on average. The \
+             tissue carried them {} mm along.",
             format::signed_mm(by_hand_m),
             format::signed_mm(by_tissue_m)
         ),
     });
-    notes.push("\"Compensate\" in a plan of many needles shifts the drop positions to compensate.".to_owned());
+    notes.push(
+        "In a plan of many needles, \"Compensate\" shifts the drops so that the seeds come to rest on plan.".to_owned(),
+    );
     Lesson {
         what: headline(shown, membranes, &seeds),
         notes,
