@@ -85,9 +85,9 @@ ratios: build-release ## Measure the force loop beside cyclictest in alternating
 procedure-test: deps-test build ## Drive a whole procedure with probe, contour, update of the plan and debrief through the window (three minutes)
 	$(CARGO) test --profile quick -p stylet-tests-window --lib update:: -- --ignored --nocapture
 
-igtl-test: deps-test products ## Compare OpenIGTLink with libOpenIGTLink and pyigtl, then serve IGTL_SECONDS (600) beside clients that hang (11 minutes)
+igtl-test: deps-test products ## Compare OpenIGTLink with libOpenIGTLink and pyigtl, show a core with Slicer's nodes, then serve IGTL_SECONDS (600) beside clients that hang (11 minutes)
 	@docs/tools/need g++ libopenigtlink-dev python3-venv
-	python3 -m venv $(BIN)/pyigtl && $(BIN)/pyigtl/bin/pip install -q pyigtl==0.3.4
+	python3 -m venv $(BIN)/pyigtl && $(BIN)/pyigtl/bin/pip install -q pyigtl==0.3.4 slicer-core==5.13.31053.0
 	$(CARGO) test --profile quick -p stylet-igtl --lib library -- --ignored --nocapture
 	STYLET_PYIGTL=$(abspath $(BIN))/pyigtl/bin/python STYLET_IGTL_S=10 $(CARGO) test --profile quick -p stylet-tests --test system igtl_python -- --ignored --nocapture --test-threads=1
 	STYLET_IGTL_S=$(or $(IGTL_SECONDS),600) $(CARGO) test --profile quick -p stylet-tests --test system igtl::clients_that_hang -- --nocapture
