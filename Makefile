@@ -153,7 +153,7 @@ python: ## Build the Python package, a wheel for Python 3.9 or newer, into targe
 	python3 -m venv $(PYTHON)/maturin && $(PYTHON)/maturin/bin/pip install -q maturin==1.16.0
 	cd rt-core/python && CARGO_TARGET_DIR=$(PYTHON) $(PYTHON)/maturin/bin/maturin build --release --locked --out $(WHEELS)
 
-python-test: python ## Install the wheel in a fresh environment, and test it beside the same in Rust, dicompyler-core and pymedphys (some minutes)
+python-test: python ## Install the wheel in a fresh environment, test it beside the same in Rust, dicompyler-core and pymedphys, and run the notebooks (some minutes)
 	python3 -m venv --clear $(PYTHON)/test
 	$(PYTHON)/test/bin/pip install -q -r rt-core/python/tests/requirements.txt
 	$(PYTHON)/test/bin/pip install -q --no-deps $(WHEELS)/stylet-*.whl
