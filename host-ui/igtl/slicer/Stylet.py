@@ -16,7 +16,7 @@ class Stylet(ScriptedLoadableModule):
         parent.title = "Stylet"
         parent.categories = ["IGT"]
         parent.contributors = ["Stylet"]
-        parent.helpText = "Shows needle, seeds and gland of a simulator of prostate brachytherapy. Not a medical device."
+        parent.helpText = "Shows a simulated brachytherapy: needle, seeds and gland. Not a medical device."
 
 
 class StyletWidget(ScriptedLoadableModuleWidget):

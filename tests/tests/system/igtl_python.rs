@@ -17,7 +17,9 @@ fn pyigtl(words: &[&str]) -> serde_json::Value {
 /// in `STYLET_PYIGTL`.
 fn python(script: &str, words: &[&str]) -> serde_json::Value {
     let python = std::env::var("STYLET_PYIGTL").expect("STYLET_PYIGTL names a Python with pyigtl");
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-ui/igtl/tests").join(script);
+    let script = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../host-ui/igtl/tests")
+        .join(script);
     let output = Command::new(python)
         .arg(script)
         .args(words)
@@ -113,8 +115,13 @@ fn slicer_shows_what_the_core_has_and_says_when_none_runs() {
         shown.join().expect("ran")
     });
     println!("{shown}");
-    let kinds = r#"{"gland":"vtkMRMLModelNode","needle":"vtkMRMLLinearTransformNode","needle's shape":"vtkMRMLModelNode","seeds":"vtkMRMLMarkupsFiducialNode"}"#;
-    assert_eq!(shown["kinds"].to_string(), kinds);
+    let kinds = serde_json::json!({
+        "gland": "vtkMRMLModelNode",
+        "needle": "vtkMRMLLinearTransformNode",
+        "needle's shape": "vtkMRMLModelNode",
+        "seeds": "vtkMRMLMarkupsFiducialNode",
+    });
+    assert_eq!(shown["kinds"], kinds);
     assert_eq!(shown["count"], 2, "a scene that was closed has no second gland");
     let scene = hand.link.scene().expect("live").header;
     let patient = scene.patient();
@@ -134,12 +141,20 @@ fn slicer_shows_what_the_core_has_and_says_when_none_runs() {
     let shaft_mm = [tip_mm[0] - 0.635, tip_mm[1] - 0.635, tip_mm[2] - 200.0];
     is_near("shaft", &end("needle's shape", 0), shaft_mm, 0.3);
     is_near("gland, low", &end("gland", 0), in_patient_mm(scene.target_lower_m), 6.0);
-    is_near("gland, high", &end("gland", 1), in_patient_mm(scene.target_upper_m), 6.0);
+    is_near(
+        "gland, high",
+        &end("gland", 1),
+        in_patient_mm(scene.target_upper_m),
+        6.0,
+    );
     assert!(shown["is_live"].as_bool().expect("said") && shown["words"].to_string().contains("1 seeds"));
     drop(hand);
     core.finish();
     let shown = watch();
-    assert!(!shown["is_live"].as_bool().expect("said") && shown["count"] == 0, "{shown}");
+    assert!(
+        !shown["is_live"].as_bool().expect("said") && shown["count"] == 0,
+        "{shown}"
+    );
     assert!(shown["words"].to_string().contains("rt-core --instance"), "{shown}");
 }
 
