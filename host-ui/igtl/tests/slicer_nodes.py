@@ -87,8 +87,13 @@ def strangers():
     refusal = struct.pack(">Hq20s", 13, 0, b"Not ready") + b"there is no room\0"
     link, *_ = after([message("STATUS", "Stylet", refusal)])
     assert link.words == "there is no room", link.words
-    for wrong in (message("STRING", "State", b"", MOST_BYTES + 1), message("TRANSFORM", "Needle", b"short")):
-        link, words, received = after([wrong])
+    beyond = struct.pack(">10I3f4I", 1, 0, 0, 0, 0, 1, 16, 0, 0, 0, 0.0, 0.0, 0.0, 3, 0, 0, 1)
+    for kind, device, body, size in (
+        ("STRING", "State", b"", MOST_BYTES + 1),
+        ("TRANSFORM", "Needle", b"short", None),
+        ("POLYDATA", "Gland", beyond, None),
+    ):
+        link, words, received = after([message(kind, device, body, size)])
         assert received == {} and words.endswith("is not Stylet's."), words
     link, words, _ = after([b""])
     # Nothing listens there now.

@@ -131,10 +131,12 @@ def points(body):
 
 
 def surface(body):
-    """Returns corners and triangles."""
+    """Returns corners and triangles, which name corners that exist: VTK would read beyond them."""
     counts = np.frombuffer(body, ">u4", 10)
     corners = np.frombuffer(body, ">f4", 3 * counts[0], 40).reshape(-1, 3)
     triangles = np.frombuffer(body, ">u4", 4 * counts[5], 40 + 12 * counts[0]).reshape(-1, 4)
+    if (triangles[:, 0] != 3).any() or (triangles[:, 1:] >= counts[0]).any():
+        raise ValueError("not triangles of these corners")
     return corners.astype(np.float32), triangles[:, 1:].astype(np.int64)
 
 
