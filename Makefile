@@ -85,9 +85,9 @@ ratios: build-release ## Measure the force loop beside cyclictest in alternating
 procedure-test: deps-test build ## Drive a whole procedure with probe, contour, update of the plan and debrief through the window (three minutes)
 	$(CARGO) test --profile quick -p stylet-tests-window --lib update:: -- --ignored --nocapture
 
-igtl-test: deps-test products ## Compare OpenIGTLink with libOpenIGTLink and pyigtl, then serve IGTL_SECONDS (600) beside clients that hang (11 minutes)
+igtl-test: deps-test products ## Compare OpenIGTLink with libOpenIGTLink and pyigtl, show a core with Slicer's nodes, then serve IGTL_SECONDS (600) beside clients that hang (11 minutes)
 	@docs/tools/need g++ libopenigtlink-dev python3-venv
-	python3 -m venv $(BIN)/pyigtl && $(BIN)/pyigtl/bin/pip install -q pyigtl==0.3.4
+	python3 -m venv $(BIN)/pyigtl && $(BIN)/pyigtl/bin/pip install -q pyigtl==0.3.4 slicer-core==5.13.31053.0
 	$(CARGO) test --profile quick -p stylet-igtl --lib library -- --ignored --nocapture
 	STYLET_PYIGTL=$(abspath $(BIN))/pyigtl/bin/python STYLET_IGTL_S=10 $(CARGO) test --profile quick -p stylet-tests --test system igtl_python -- --ignored --nocapture --test-threads=1
 	STYLET_IGTL_S=$(or $(IGTL_SECONDS),600) $(CARGO) test --profile quick -p stylet-tests --test system igtl::clients_that_hang -- --nocapture
@@ -156,7 +156,7 @@ python: ## Build the Python package, a wheel for Python 3.9 or newer, into targe
 	python3 -m venv $(PYTHON)/maturin && $(PYTHON)/maturin/bin/pip install -q maturin==1.16.0
 	cd rt-core/python && CARGO_TARGET_DIR=$(PYTHON) $(PYTHON)/maturin/bin/maturin build --release --locked --out $(WHEELS)
 
-python-test: python ## Install the wheel in a fresh environment, and test it beside the same in Rust, dicompyler-core and pymedphys (some minutes)
+python-test: python ## Install the wheel in a fresh environment, test it beside the same in Rust, dicompyler-core and pymedphys, and run the notebooks (some minutes)
 	python3 -m venv --clear $(PYTHON)/test
 	$(PYTHON)/test/bin/pip install -q -r rt-core/python/tests/requirements.txt
 	$(PYTHON)/test/bin/pip install -q --no-deps $(WHEELS)/stylet-*.whl

@@ -1,7 +1,6 @@
 """Bodies and needles that several tests use."""
 
 import pathlib
-import sys
 
 import numpy as np
 import pytest
@@ -10,8 +9,6 @@ import stylet
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 ENTRY_MM = (72.979, 44.715, 86.401)
 AXIS = (0.0, 0.0, 1.0)
-
-sys.path.insert(0, str(ROOT / "rt-core/python/examples"))
 
 
 @pytest.fixture(scope="session")

@@ -1,12 +1,13 @@
 """Help and types: everything public is explained, and typed as it is."""
 
 import inspect
+import json
 import pathlib
 import subprocess
 import sys
 
-import force_by_tissue
 import stylet
+from conftest import ROOT
 
 
 def public():
@@ -32,8 +33,9 @@ def test_types_are_those_of_the_module():
         assert run.returncode == 0, run.stdout + run.stderr
 
 
-def test_the_example_draws_three_tissues(tmp_path, capsys):
-    force_by_tissue.main(str(tmp_path / "force.png"))
-    assert (tmp_path / "force.png").stat().st_size > 10_000
-    said = capsys.readouterr().out
-    assert all(tissue in said for tissue in stylet.tissues())
+def test_notebooks_are_stored_without_outputs():
+    notebooks = list((ROOT / "rt-core/python/examples").glob("*.ipynb"))
+    assert len(notebooks) == 5
+    for path in notebooks:
+        cells = json.loads(path.read_text())["cells"]
+        assert [cell for cell in cells if cell.get("outputs") or cell.get("execution_count")] == [], path.name

@@ -1,16 +1,25 @@
-//! `host-ui igtl` with the client of another implementation, pyigtl: it reads the codec's output, watches a core and
-//! moves its hand.
+//! `host-ui igtl` with clients in Python. pyigtl, another implementation, reads the codec's output, watches a core and
+//! moves its hand; the module for 3D Slicer shows a core with Slicer's own nodes.
 
 use crate::igtl::{Served, distance_m, tip_m, watched};
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-use stylet_tests::Core;
+use stylet_shm_schema::Request;
+use stylet_tests::hand::Insertion;
+use stylet_tests::{Core, ask};
 
-/// Runs pyigtl, which `make igtl-test` installs in a separate folder, naming its Python in `STYLET_PYIGTL`.
 fn pyigtl(words: &[&str]) -> serde_json::Value {
+    python("client.py", words)
+}
+
+/// Runs a script with pyigtl and slicer-core, which `make igtl-test` installs in a separate folder, naming its Python
+/// in `STYLET_PYIGTL`.
+fn python(script: &str, words: &[&str]) -> serde_json::Value {
     let python = std::env::var("STYLET_PYIGTL").expect("STYLET_PYIGTL names a Python with pyigtl");
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-ui/igtl/tests/client.py");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../host-ui/igtl/tests")
+        .join(script);
     let output = Command::new(python)
         .arg(script)
         .args(words)
@@ -85,4 +94,72 @@ fn pyigtl_watches_and_moves_the_hand() {
     assert_eq!(refused, None);
     drop((served, link));
     core.finish();
+}
+
+#[test]
+#[ignore = "needs slicer-core: make igtl-test"]
+fn slicer_shows_what_the_core_has_and_says_when_none_runs() {
+    let mut core = Core::start_with(&["--no-rt"]);
+    let mut hand = Insertion::begin(&mut core, 0.015);
+    hand.watch(Duration::from_secs(4));
+    ask(&mut hand.link, &Request::DropSeed { strand_pitch_m: None }).expect("dropped");
+    let served = Served::start(&core, &[]);
+    let (host, port) = served.address.rsplit_once(':').expect("a port");
+    let watch = || python("slicer_nodes.py", &["watch", host, port, "6"]);
+    // A host that goes on polling keeps the needle where it is.
+    let shown = std::thread::scope(|scope| {
+        let shown = scope.spawn(watch);
+        while !shown.is_finished() {
+            hand.watch(Duration::from_millis(50));
+        }
+        shown.join().expect("ran")
+    });
+    println!("{shown}");
+    let kinds = serde_json::json!({
+        "gland": "vtkMRMLModelNode",
+        "needle": "vtkMRMLLinearTransformNode",
+        "needle's shape": "vtkMRMLModelNode",
+        "seeds": "vtkMRMLMarkupsFiducialNode",
+    });
+    assert_eq!(shown["kinds"], kinds);
+    assert_eq!(shown["count"], 2, "a scene that was closed has no second gland");
+    let scene = hand.link.scene().expect("live").header;
+    let patient = scene.patient();
+    let in_patient_mm = |in_scene_m: [f64; 3]| patient.patient_from_scene(in_scene_m).map(|c| c * 1e3);
+    let is_near = |name: &str, shown: &serde_json::Value, expected: [f64; 3], within_mm: f64| {
+        let shown: [f64; 3] = serde_json::from_value(shown.clone()).expect("a place");
+        let off_mm = (0..3).map(|a| (shown[a] - expected[a]).abs()).fold(0.0, f64::max);
+        println!("{name}: {off_mm:.3} mm off");
+        assert!(off_mm < within_mm, "{name}: {shown:?}, {expected:?}");
+    };
+    let tip_mm = in_patient_mm(hand.link.state().expect("live").tip_in_scene_m);
+    is_near("tip", &shown["tip_mm"], tip_mm, 0.2);
+    let seed_m = hand.link.snapshot().expect("live").header.seeds[0].position_m;
+    is_near("seed", &shown["seeds_mm"][0], in_patient_mm(seed_m), 0.2);
+    // The scene of the paper lies along the patient's axes, and its needle along the third.
+    let end = |what: &str, end: usize| serde_json::json!([0, 1, 2].map(|a| shown[what][2 * a + end].as_f64()));
+    let shaft_mm = [tip_mm[0] - 0.635, tip_mm[1] - 0.635, tip_mm[2] - 200.0];
+    is_near("shaft", &end("needle's shape", 0), shaft_mm, 0.3);
+    is_near("gland, low", &end("gland", 0), in_patient_mm(scene.target_lower_m), 6.0);
+    is_near(
+        "gland, high",
+        &end("gland", 1),
+        in_patient_mm(scene.target_upper_m),
+        6.0,
+    );
+    assert!(shown["is_live"].as_bool().expect("said") && shown["words"].to_string().contains("1 seeds"));
+    drop(hand);
+    core.finish();
+    let shown = watch();
+    assert!(
+        !shown["is_live"].as_bool().expect("said") && shown["count"] == 0,
+        "{shown}"
+    );
+    assert!(shown["words"].to_string().contains("rt-core --instance"), "{shown}");
+}
+
+#[test]
+#[ignore = "needs NumPy: make igtl-test"]
+fn slicer_says_what_is_wrong_with_a_server() {
+    python("slicer_nodes.py", &["strangers"]);
 }
