@@ -79,7 +79,7 @@ fn integral_of_sphere(radius_m: f64, nu: f64, z_m: f64) -> f64 {
     (4.0 - 4.0 * nu) * (z_m / radius_m).asinh() - part + (part - part.powi(3)) / 3.0
 }
 
-/// The same of an evenly loaded cube with the needle in its middle.
+/// Returns the same for an evenly loaded cube with the needle in its middle.
 fn integral_of_cube(edge_m: f64, radius_m: f64, nu: f64, z_m: f64) -> f64 {
     let place_m = |n: usize| ((n as f64 + 0.5) / ACROSS as f64 - 0.5) * edge_m;
     // Integral of that by a load at this distance across, over the load's places along the needle.
