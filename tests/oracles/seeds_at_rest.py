@@ -6,11 +6,12 @@
 Body: gland_on_springs.py. Mesh `fine` has shorter pieces and steps as well.
 
 Needle: a cylinder of its own radius, with friction spread over the surface of short pieces; its tip is an evenly loaded sphere of
-that radius, which moves as a rigid one. The hand moves in small steps. In each, the friction of a piece follows a return mapping
-with a stiff spring: Newton's method with derivatives of the clipped force, or bounded least squares where that goes in circles. What
-the tip reaches sticks where it is and begins without force. The tip cuts at its force, stays, or draws back without force: each a root
-of y + u(y) = s. The membrane at the entry is a spring from rest to its force and depth. Then seeds in a column, as docs/physics/seeds.md
-says, or on a strand.
+that radius, which moves as a rigid one. Nearer to the surface than the pages' patch, what it moves itself is that at the patch's
+radius: their near field is that of an endless medium (SURFACE_M of 0.7 mm shows what that leaves out). The hand moves in small
+steps. In each, the friction of a piece follows a return mapping with a stiff spring: Newton's method with derivatives of the
+clipped force, or bounded least squares where that goes in circles. What the tip reaches sticks where it is and begins without
+force. The tip cuts at its force, stays, or draws back without force: each a root of y + u(y) = s. The membrane at the entry is a
+spring from rest to its force and depth. Then seeds in a column, as docs/physics/seeds.md says, or on a strand.
 
 Lines of the CSV: mesh, friction in N/m, toughness in J/m2, name, numbers. Offsets of seeds from plan in mm, deepest first; total
 and tip force in N at 10, 20 and 30 mm, at the turn and before each later drop; displacement along the needle of the mean cell, and of
@@ -31,6 +32,7 @@ from gland_on_springs import KELVIN, NEEDLE, POISSON, SHEAR, Body, gauss, kelvin
 SEED, SEED_RADIUS = 4.5e-3, 0.4e-3
 MEMBRANE_N, MEMBRANE_M = 5.6, 8e-3
 WEDGE_N = np.pi * SHEAR * NEEDLE**2
+SURFACE_M = 2.5e-3
 
 
 class Line:
@@ -58,7 +60,7 @@ class Line:
             at = self.middle_m + q * self.piece_m / 2
             table += weight / 2 * self.sphere(at[None, :] - grid[:, None], NEEDLE)
         table += self.spline(np.clip(grid, *self.ends), inside)
-        own = (5 - 6 * POISSON) / (24 * np.pi * SHEAR * (1 - POISSON) * NEEDLE) + np.array([self.spline(a, a)[0, 0] for a in np.clip(grid, *self.ends)])
+        own = (5 - 6 * POISSON) / (24 * np.pi * SHEAR * (1 - POISSON) * NEEDLE) + np.array([self.spline(a, a)[0, 0] for a in np.clip(grid, SURFACE_M, self.ends[1])])
         self.by_tip, self.own = scipy.interpolate.CubicSpline(grid, table), scipy.interpolate.CubicSpline(grid, own)
 
     def shaft_by_shaft(self, apart_m):
@@ -293,7 +295,7 @@ def results(body, mesh, piece_m, step_m, centres):
 
 
 # Length of the pieces and of the steps of the hand.
-MESHES = {"coarse": (0.75e-3, 0.5e-3), "fine": (0.4e-3, 0.4e-3)}
+MESHES = {"coarse": (0.75e-3, 0.5e-3), "fine": (0.2e-3, 0.2e-3)}
 
 if __name__ == "__main__":
     path = pathlib.Path(__file__).parent / "seeds_at_rest.csv"

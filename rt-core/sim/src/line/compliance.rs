@@ -10,7 +10,7 @@ use crate::tissue::fem::batch::BatchModel;
 use serde::{Deserialize, Serialize};
 
 /// Shortest end of a shaft that loads a station, over the station's length. The shorter, the more a result depends on
-/// the hand's steps, and with 0.25 the compliance is indefinite at some places (ADR 26).
+/// the hand's steps, and the less is left of the tip's own compliance where the shaft sticks (ADR 26).
 const SHORTEST: f64 = 0.5;
 
 /// Stations that were all solved for: symmetric, positive definite. Rows 0 to m - 1 are the shaft's stations, m to 2m -

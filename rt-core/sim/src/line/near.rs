@@ -6,8 +6,15 @@ use serde::{Deserialize, Serialize};
 const REACH: f64 = 5.0;
 const STEPS: usize = 256;
 
-/// Displacement of the needle's surface by a sphere of its radius, less that by a sphere of the patch's radius, over
-/// that in its middle; by the distance along the needle.
+/// Edge of a cube whose even load moves it on average as the same force moves a rigid sphere of radius 1: the mean of 1
+/// / r over all pairs of points of a unit cube.
+pub(super) const CUBE_PER_RADIUS: f64 = 1.882_312_645;
+/// Samples across that cube. It moves the shaft in its middle by a quarter more than it moves on average, so no sphere
+/// can stand for it there.
+const ACROSS: usize = 16;
+
+/// Displacement of the needle's surface by a sphere of its radius, less that by the patch's cube, over what the tip
+/// itself lacks; by the distance along the needle.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NearTip {
     step_m: f64,
@@ -23,10 +30,10 @@ impl NearTip {
         }
         let step_m = REACH * patch_radius_m / STEPS as f64;
         let within = (10.0 / 3.0 - 4.0 * nu) * (1.0 / radius_m - 1.0 / patch_radius_m);
-        let sphere = |of_m, z_m| integral_of_sphere(of_m, radius_m, nu, z_m);
+        let edge_m = CUBE_PER_RADIUS * patch_radius_m;
         let at = |n: usize| {
             let z_m = n as f64 * step_m;
-            (sphere(radius_m, z_m) - sphere(patch_radius_m, z_m)) / within
+            (integral_of_sphere(radius_m, nu, z_m) - integral_of_cube(edge_m, radius_m, nu, z_m)) / within
         };
         NearTip {
             step_m,
@@ -65,18 +72,26 @@ impl NearTip {
     }
 }
 
-/// Returns the integral, along the needle's surface from the sphere's middle on, of how an evenly loaded sphere moves
-/// an endless medium; over `1 / (16 pi G (1 - nu))`.
-fn integral_of_sphere(sphere_m: f64, needle_m: f64, nu: f64, z_m: f64) -> f64 {
-    // Inside, the sphere moves as a rigid one.
-    let rim_m = (sphere_m * sphere_m - needle_m * needle_m).max(0.0).sqrt();
-    let beyond = |z_m: f64| {
-        let (a, r) = (needle_m, z_m.hypot(needle_m));
-        (4.0 - 4.0 * nu) * (z_m / a).asinh() - z_m / r
-            + sphere_m * sphere_m / 3.0 * (z_m / (a * a * r) - z_m.powi(3) / (a * a * r.powi(3)))
+/// Returns the integral, along the needle's surface from the middle on, of how an evenly loaded sphere of its radius
+/// moves an endless medium; over `1 / (16 pi G (1 - nu))`.
+fn integral_of_sphere(radius_m: f64, nu: f64, z_m: f64) -> f64 {
+    let part = z_m / z_m.hypot(radius_m);
+    (4.0 - 4.0 * nu) * (z_m / radius_m).asinh() - part + (part - part.powi(3)) / 3.0
+}
+
+/// Returns the same for an evenly loaded cube with the needle in its middle.
+fn integral_of_cube(edge_m: f64, radius_m: f64, nu: f64, z_m: f64) -> f64 {
+    let place_m = |n: usize| ((n as f64 + 0.5) / ACROSS as f64 - 0.5) * edge_m;
+    // Integral of that by a load at this distance across, over the load's places along the needle.
+    let twice = |across_m: f64, z_m: f64| {
+        let r = z_m.hypot(across_m);
+        (4.0 - 4.0 * nu) * (z_m * (z_m / across_m).asinh() - r) - r
     };
-    let within_m = z_m.min(rim_m);
-    (10.0 / 3.0 - 4.0 * nu) / sphere_m * within_m + beyond(z_m.max(rim_m)) - beyond(rim_m)
+    let each = (0..ACROSS * ACROSS).map(|n| {
+        let across_m = (place_m(n % ACROSS) - radius_m).hypot(place_m(n / ACROSS));
+        twice(across_m, z_m + 0.5 * edge_m) - twice(across_m, z_m - 0.5 * edge_m)
+    });
+    each.sum::<f64>() / (ACROSS * ACROSS) as f64 / edge_m
 }
 
 #[cfg(test)]

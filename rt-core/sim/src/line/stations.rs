@@ -1,6 +1,6 @@
 //! Stations along the needle's way through the tissue at rest, and where each of them loads the lattice.
 
-use super::near::NearTip;
+use super::near::{CUBE_PER_RADIUS, NearTip};
 use crate::tissue::fem::Compiled;
 use crate::tissue::fem::batch::{BatchModel, NodeWeight, Part};
 use serde::{Deserialize, Serialize};
@@ -13,9 +13,6 @@ const ALONG: usize = 4;
 const AROUND: usize = 8;
 /// Samples across the patch that the tip loads.
 const ACROSS: usize = 8;
-/// Edge of a cube whose even load moves it on average as the same force moves a rigid sphere of radius 1: the mean of 1
-/// / r over all pairs of points of a unit cube.
-const CUBE_PER_RADIUS: f64 = 1.882_312_645;
 
 /// Outer radius of an 18 G needle, m (nominal outer diameter 1.27 mm).
 pub const NEEDLE_RADIUS_M: f64 = 0.635e-3;

@@ -60,12 +60,14 @@ fn moved(stage: &mut Stage, case: Case, strand: bool) -> Option<Shown> {
     let stand = |samples: &mut Vec<f64>, at_m: f64| samples.extend([at_m; REST_TICKS]);
     stand(&mut samples, at_m);
     let tips_m = planned_m.map(|m| m + 0.5 * SEED_LENGTH_M);
-    for &to_m in IN_M.iter().chain(&tips_m).chain([&-BEFORE_M]) {
+    for &to_m in IN_M.iter().chain(&tips_m) {
         let ticks = ((to_m - at_m).abs() / SPEED_M_PER_S / 1e-3).ceil().max(1.0);
         samples.extend((1..=ticks as u32).map(|n| at_m + (to_m - at_m) * f64::from(n) / ticks));
         at_m = to_m;
         stand(&mut samples, at_m);
         marks.push(samples.len());
+        // The tissue loop may take an order four ticks later, and the tip is then still there.
+        stand(&mut samples, at_m);
     }
     let tools = samples.iter().map(|m| Sample {
         tip_in_world: Vector3::new(middle_m[0], middle_m[1], low_m[2] + m),
@@ -97,7 +99,7 @@ fn moved(stage: &mut Stage, case: Case, strand: bool) -> Option<Shown> {
         .collect();
     let all: Vec<u32> = (0..scene.body.element_count() as u32).collect();
     let mut shown = Shown::default();
-    for tick in 1..=samples.len() + 1000 {
+    for tick in 1..=samples.len() {
         rig.tick();
         if let Some(refusal) = rig.refusal() {
             assert_eq!(refusal, RefusalCode::TipOutsideTissue, "at {tick}");
@@ -107,9 +109,6 @@ fn moved(stage: &mut Stage, case: Case, strand: bool) -> Option<Shown> {
         let Some(mark) = marks.iter().position(|m| *m == tick) else {
             continue;
         };
-        if mark > IN_M.len() + planned_m.len() - 1 {
-            continue;
-        }
         let state = rig.line_state().expect("a line");
         shown.tip_n.push(state.tip().force_n);
         shown
@@ -127,7 +126,8 @@ fn moved(stage: &mut Stage, case: Case, strand: bool) -> Option<Shown> {
             rig.drop_seed(pitch_m);
         }
     }
-    let seeds = rig.seeds();
+    // ChainMail takes seconds to come to rest: after one, two seeds were read 0.06 mm nearer than touching.
+    let seeds = rig.seeds_at_rest();
     let off_mm = seeds
         .iter()
         .zip(planned_m)
@@ -218,7 +218,7 @@ fn compare(stage: &mut Stage, name: &str, case: Case) -> Option<Off> {
 fn seeds_rest_where_another_method_has_them() {
     let mut stage = on_springs(TissueKind::Fem);
     stage.seeds_and_forces_alone();
-    for case in [[18.0, 164.0], [80.0, 164.0]] {
+    for case in [[18.0, 164.0], [80.0, 164.0], [18.0, 388.0], [80.0, 388.0]] {
         let off = compare(&mut stage, "finite elements", case);
         assert!(off.is_some_and(|off| off.meets()), "{off:?}");
     }

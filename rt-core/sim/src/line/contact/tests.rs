@@ -220,7 +220,7 @@ fn speed_does_not_decide_where_seeds_go() {
         worst = (worst.0.max(place_m), worst.1.max(force));
     }
     // The force of the last station, which the tip moves the most, depends on the step: ADR 26.
-    assert!(worst.0 < 0.15e-3 && worst.1 < 0.02);
+    assert!(worst.0 < 0.11e-3 && worst.1 < 0.02);
 }
 
 #[test]
@@ -240,14 +240,14 @@ fn half_the_tick_and_half_the_spacing_change_little() {
         1e3 * near.0,
         100.0 * near.1
     );
-    assert!(near.0 < 0.3e-3 && near.1 < 0.02);
+    assert!(near.0 < 0.16e-3 && near.1 < 0.02);
     let (place_m, force) = difference_of(&ours[1..], &halves[1..], largest);
     println!("ours   {}\nhalves {}", figures(&ours), figures(&halves));
     println!("spacing: seeds {:.4} mm, force {:.3} %", 1e3 * place_m, 100.0 * force);
     assert!(by_tick.0 < 0.1e-3 && by_tick.1 < 0.02);
-    // The bar of ADR 10 is 0.1 mm, and is missed by 0.3 mm on the way in: the end of the shaft is half a station or
+    // The bar of ADR 10 is 0.1 mm, and is missed by 0.15 mm on the way in: the end of the shaft is half a station or
     // more.
-    assert!(place_m < 0.41e-3 && force < 0.02);
+    assert!(place_m < 0.26e-3 && force < 0.02);
 }
 
 /// The work of the hand is the sum of the force *after* each tick times the motion in it, as the implicit step has it.
@@ -314,7 +314,7 @@ fn a_narrow_tip_and_its_shaft_are_positive_definite_at_every_place() {
             "{:.3} of what the tip moves itself is left where the shaft sticks",
             least
         );
-        assert!(least > 0.05, "{least}");
+        assert!(least > 0.15, "{least}");
     }
 }
 
