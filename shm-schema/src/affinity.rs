@@ -49,6 +49,17 @@ pub fn keep_off(core: usize) {
     }
 }
 
+/// Lets this thread, and the program that it becomes, run on all cores again, also after [`keep_off`]. Allocates nothing,
+/// so that it may run between fork and exec.
+pub fn return_to_all_cores() {
+    // SAFETY: all zeros is an empty set, which then holds every core; the kernel leaves out those that are not allowed.
+    unsafe {
+        let mut cores: libc::cpu_set_t = std::mem::zeroed();
+        (0..libc::CPU_SETSIZE as usize).for_each(|core| libc::CPU_SET(core, &mut cores));
+        libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &cores);
+    }
+}
+
 fn keep_thread_off(thread: libc::pid_t, core: usize) {
     if core >= libc::CPU_SETSIZE as usize {
         return;

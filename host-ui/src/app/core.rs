@@ -6,7 +6,7 @@ use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use stylet_host::core_args::SceneChoice;
-use stylet_shm_schema::BUILTIN_SCENES;
+use stylet_shm_schema::{BUILTIN_SCENES, affinity};
 
 const PROGRAM: &str = "rt-core";
 
@@ -35,13 +35,21 @@ impl App {
         if let Some(scene) = self.present_scene() {
             self.files.first_scene = Some(scene);
         }
-        let started = Command::new(&program)
+        let mut command = Command::new(&program);
+        command
             .args(["--instance", &self.shown.instance, "--rt-if-allowed"])
             .stdin(Stdio::null())
             .stderr(log().map_or_else(|_| Stdio::inherit(), Stdio::from))
-            .process_group(0)
-            .spawn();
-        match started {
+            .process_group(0);
+        // SAFETY: `return_to_all_cores` makes one system call and allocates nothing.
+        // The window has left the core of the last force loop; both loops of the next core would share what is left.
+        unsafe {
+            command.pre_exec(|| {
+                affinity::return_to_all_cores();
+                Ok(())
+            });
+        }
+        match command.spawn() {
             Ok(child) => self.started_core = Some(StartedCore(child)),
             Err(why) => {
                 let text = format!(

@@ -23,6 +23,8 @@ pub(super) struct SceneFiles {
     pub uploading: Option<(u64, String)>,
     /// True from the sending of a scene until it runs: its needle begins outside.
     pub begins_outside: bool,
+    /// True from then on until the scene is drawn and the needle goes there.
+    pub goes_outside: bool,
     /// Table of the structures of the file that was read last, until the core has them.
     pub structures: Option<StructureTable>,
     /// File that is being read or sent as the next scene, and file of the present scene if this

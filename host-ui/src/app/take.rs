@@ -9,7 +9,7 @@ use crate::dose_worker::DoseRequest;
 use crate::loader::Loaded;
 use crate::panel::workflow::SCRIPTED_STEPS;
 use crate::recent;
-use crate::shown::{LoadState, Note};
+use crate::shown::{LoadState, Note, all_errors};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stylet_controllers::Button;
@@ -38,8 +38,9 @@ impl App {
         if self.shown.scene.map(|s| s.id()) != scene_before {
             // The file of another scene's plan is not replaced by this one's.
             self.workflow.plan.forget_file();
-            self.begin_outside();
+            self.files.goes_outside = std::mem::take(&mut self.files.begins_outside);
         }
+        self.begin_outside();
         self.leave_core();
         self.take_core();
         self.keep_of_ended_core();
@@ -79,12 +80,14 @@ impl App {
     }
 
     /// Moves a simulated needle in front of the template of a scene that this window has loaded: at its place in the
-    /// last scene it would lie in the new body.
+    /// last scene it would lie in the new body. It waits for the drawn surfaces, since a window that makes them answers
+    /// too late for a motion.
     fn begin_outside(&mut self) {
-        let begins = std::mem::take(&mut self.files.begins_outside) && self.shown.has_flag(flags::SIMULATED_DEVICE);
-        let Some(scene) = self.shown.scene.filter(|_| begins) else {
+        let is_drawn = self.link.scene().is_some_and(|scene| scene.bodies_made().is_some());
+        if !is_drawn || !std::mem::take(&mut self.files.goes_outside) || !self.shown.has_flag(flags::SIMULATED_DEVICE) {
             return;
-        };
+        }
+        let Some(scene) = self.shown.scene else { return };
         let Template { middle_m, inwards, .. } = Template::before(&scene);
         let start_m = [0, 1, 2].map(|a| middle_m[a] - inwards[a] * BEFORE_TEMPLATE_M);
         let pace = &self.pace;
@@ -330,6 +333,21 @@ impl App {
         };
     }
 
+    /// Says how a run ended, with the planned seeds that are not in the tissue.
+    fn done(&self) -> Note {
+        let needles = self.script.needles.len();
+        let seeds = all_errors(&self.shown);
+        let missing = seeds.iter().filter(|(_, seed)| seed.placed.is_none()).count();
+        match (needles, missing) {
+            (0, _) => Note::done(format!("Done: {SCRIPTED_STEPS}.")),
+            (n, 0) => Note::done(format!("All {n} needles are done.")),
+            (n, missing) => Note::refusal(format!(
+                "All {n} needles are done, but {missing} of {} seeds were not placed: their needle did not puncture.",
+                seeds.len()
+            )),
+        }
+    }
+
     fn advance_run(&mut self) {
         if let Some(run) = &mut self.run {
             let status = run.advance(&mut self.link);
@@ -340,10 +358,7 @@ impl App {
             self.follow_run(needle, status == RunStatus::Done);
             self.shown.note = match status {
                 RunStatus::Working => None,
-                RunStatus::Done => Some(Note::done(match self.script.needles.len() {
-                    0 => format!("Done: {SCRIPTED_STEPS}."),
-                    n => format!("All {n} needles are done."),
-                })),
+                RunStatus::Done => Some(self.done()),
                 RunStatus::Failed(why) => Some(Note::refusal(format!("The run stopped: {why}"))),
             };
             if self.shown.note.is_some() {

@@ -83,7 +83,7 @@ fn lost(score: &Score) -> Markup {
     html! {
         @if lost > 0 {
             p class="bad" {
-                (lost) " of " (placed + lost) " planned seeds were lost: the tip was outside the tissue when they were dropped."
+                (lost) " of " (placed + lost) " planned seeds were not placed: the tip was outside the tissue, or they had not been dropped yet."
             }
         }
         @let (others, all) = (score.implant.unplanned.len(), score.seeds());

@@ -133,7 +133,7 @@ pub fn missing(shown: &Shown, step: Progress) -> Option<String> {
             format::length(needle.beside_m)
         )),
         (Progress::Drop, _) if !shown.has_punctured() && shown.seeds.is_empty() => {
-            Some("insert the needle first: the tip is not in the tissue".to_owned())
+            Some("insert the needle first: no membrane has opened yet".to_owned())
         }
         (Progress::Debrief, _) if shown.seeds.is_empty() => Some("no seed has been dropped yet".to_owned()),
         _ => None,

@@ -220,6 +220,37 @@ impl Depths {
     }
 }
 
+/// Motion of the seeds of a needle along it.
+struct Moved {
+    mean_m: f64,
+    /// Mean of the sizes.
+    size_m: f64,
+}
+
+impl Moved {
+    fn of(ways_m: impl ExactSizeIterator<Item = f64> + Clone) -> Self {
+        let count = ways_m.len() as f64;
+        Self {
+            mean_m: ways_m.clone().sum::<f64>() / count,
+            size_m: ways_m.map(f64::abs).sum::<f64>() / count,
+        }
+    }
+}
+
+impl std::fmt::Display for Moved {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // Ways that go against each other would cancel out in a mean.
+        match self.mean_m.abs() > 0.9 * self.size_m {
+            true => write!(f, "{} mm on average", format::signed_mm(self.mean_m)),
+            false => write!(
+                f,
+                "{} on average, some deeper and some shallower",
+                format::length(self.size_m)
+            ),
+        }
+    }
+}
+
 fn depths(shown: &Shown) -> Vec<Depths> {
     let needle = shown.planning.at_work().map_or(0, |(number, _)| number);
     let of_seed = |row: SeedError| {
@@ -246,9 +277,8 @@ fn debrief(shown: &Shown, membranes: &MetMembranes) -> Lesson {
             &[],
         );
     }
-    let mean_m = |of: &dyn Fn(&Depths) -> f64| seeds.iter().map(of).sum::<f64>() / seeds.len() as f64;
-    let by_hand_m = mean_m(&|seed| seed.left_m - seed.planned_m);
-    let by_tissue_m = mean_m(&|seed| seed.rests_m - seed.left_m);
+    let by_hand = Moved::of(seeds.iter().map(|seed| seed.left_m - seed.planned_m));
+    let by_tissue = Moved::of(seeds.iter().map(|seed| seed.rests_m - seed.left_m));
     let mut notes: Vec<String> = membranes.punctures().iter().map(pressed).collect();
     notes.extend(seeds.iter().take(SEEDS).map(|seed| {
         format!(
@@ -261,18 +291,14 @@ fn debrief(shown: &Shown, membranes: &MetMembranes) -> Lesson {
             seed.outside.map_or_else(String::new, |place| format!("; {place}"))
         )
     }));
-    notes.push(match by_tissue_m.abs() >= by_hand_m.abs() {
+    notes.push(match by_tissue.size_m >= by_hand.size_m {
         true => format!(
-            "Most of the error comes from the tissue: as the needle left, it went back and carried the seeds {} mm along on \
-             average. The hand dropped them {} mm from their planned places.",
-            format::signed_mm(by_tissue_m),
-            format::signed_mm(by_hand_m)
+            "Most of the error comes from the tissue: as the needle left, it went back and carried the seeds {by_tissue}. \
+             The hand dropped them {by_hand} from their planned places."
         ),
         false => format!(
-            "Most of the error comes from the hand: it dropped the seeds {} mm from their planned places on average. The \
-             tissue carried them {} mm along.",
-            format::signed_mm(by_hand_m),
-            format::signed_mm(by_tissue_m)
+            "Most of the error comes from the hand: it dropped the seeds {by_hand} from their planned places. The tissue \
+             carried them {by_tissue}."
         ),
     });
     notes.push(
