@@ -130,6 +130,8 @@ mod tests {
             assert_eq!(allowed(), last);
             assert_eq!(std::thread::spawn(allowed).join().expect("no panic"), last);
             keep_thread_off(me, usize::MAX);
+            return_to_all_cores();
+            assert_eq!(allowed(), before);
         });
         test.join().expect("no panic");
     }

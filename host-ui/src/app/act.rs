@@ -2,6 +2,7 @@
 
 use super::debrief::folder_of;
 use super::drive::{BEFORE_ENTRY_M, Drive, Goal};
+use super::files::Going;
 use super::{App, Waiting};
 use crate::action::{Action, PlanAction};
 use crate::panel::question::{Begin, Question};
@@ -79,6 +80,7 @@ impl App {
 
     /// Executes a request, or asks first if it removes what is in the tissue.
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
+        self.files.going_outside = Going::No;
         // Until a question is answered the needle may only be stopped, and the force only go off.
         let passes = matches!(
             action,

@@ -23,8 +23,7 @@ pub(super) struct SceneFiles {
     pub uploading: Option<(u64, String)>,
     /// True from the sending of a scene until it runs: its needle begins outside.
     pub begins_outside: bool,
-    /// True from then on until the scene is drawn and the needle goes there.
-    pub goes_outside: bool,
+    pub going_outside: Going,
     /// Table of the structures of the file that was read last, until the core has them.
     pub structures: Option<StructureTable>,
     /// File that is being read or sent as the next scene, and file of the present scene if this
@@ -33,6 +32,15 @@ pub(super) struct SceneFiles {
     pub scene_file: Option<SentScene>,
     /// Image to show once the scene of this name is loaded.
     pub image_to_come: Option<(Image, String)>,
+}
+
+/// Way of the needle out of a scene that was loaded, until the operator does something.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Going {
+    #[default]
+    No,
+    Due,
+    Sent,
 }
 
 /// File that this window reads and sends as a scene.

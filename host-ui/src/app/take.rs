@@ -3,7 +3,7 @@
 
 use super::App;
 use super::drive::Drive;
-use super::files::SentScene;
+use super::files::{Going, SentScene};
 use crate::action::Action;
 use crate::dose_worker::DoseRequest;
 use crate::loader::Loaded;
@@ -38,7 +38,10 @@ impl App {
         if self.shown.scene.map(|s| s.id()) != scene_before {
             // The file of another scene's plan is not replaced by this one's.
             self.workflow.plan.forget_file();
-            self.files.goes_outside = std::mem::take(&mut self.files.begins_outside);
+            let begins = std::mem::take(&mut self.files.begins_outside);
+            if begins && self.shown.has_flag(flags::SIMULATED_DEVICE) {
+                self.files.going_outside = Going::Due;
+            }
         }
         self.begin_outside();
         self.leave_core();
@@ -80,16 +83,23 @@ impl App {
     }
 
     /// Moves a simulated needle in front of the template of a scene that this window has loaded: at its place in the
-    /// last scene it would lie in the new body. It waits for the drawn surfaces, since a window that makes them answers
-    /// too late for a motion.
+    /// last scene it would lie in the new body. A window that draws a scene for the first time may answer too late for
+    /// a motion, which is then sent again.
     fn begin_outside(&mut self) {
-        let is_drawn = self.link.scene().is_some_and(|scene| scene.bodies_made().is_some());
-        if !is_drawn || !std::mem::take(&mut self.files.goes_outside) || !self.shown.has_flag(flags::SIMULATED_DEVICE) {
+        let going = &mut self.files.going_outside;
+        let (Some(scene), true) = (self.shown.scene, *going != Going::No) else {
             return;
-        }
-        let Some(scene) = self.shown.scene else { return };
+        };
         let Template { middle_m, inwards, .. } = Template::before(&scene);
         let start_m = [0, 1, 2].map(|a| middle_m[a] - inwards[a] * BEFORE_TEMPLATE_M);
+        if *going == Going::Sent {
+            let is_near = |tip_m: [f64; 3]| (0..3).all(|a| (tip_m[a] - start_m[a]).abs() < 1e-3);
+            if self.shown.state.is_some_and(|state| is_near(state.tip_in_scene_m)) {
+                *going = Going::No;
+            }
+            return;
+        }
+        *going = Going::Sent;
         let pace = &self.pace;
         let request = move_request(start_m, inwards, pace.approach_m_per_s, pace.acceleration_m_per_s2);
         self.send("Needle", &request);
@@ -228,7 +238,9 @@ impl App {
             return;
         };
         let is_new = at.is_some_and(|at| state.tick.saturating_sub(at) < NEW_TICKS) && at != before;
-        if is_new && self.run.is_none() && !self.watches() {
+        if is_new && self.files.going_outside == Going::Sent {
+            self.files.going_outside = Going::Due;
+        } else if is_new && self.run.is_none() && !self.watches() {
             self.refuse("The needle was stopped before its goal: its motion was not confirmed in time. Move it again.");
         }
     }

@@ -12,7 +12,7 @@ fn features(arguments: &str) -> BTreeMap<String, BTreeSet<String>> {
         .args([
             "--profile",
             "quick",
-            "--offline",
+            "--locked",
             "--unit-graph",
             "-Z",
             "unstable-options",

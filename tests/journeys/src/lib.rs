@@ -4,6 +4,8 @@
 #[cfg(test)]
 mod products;
 #[cfg(test)]
+mod run_script;
+#[cfg(test)]
 mod simulator;
 #[cfg(test)]
 mod tutorials;

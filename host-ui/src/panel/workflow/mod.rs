@@ -219,7 +219,7 @@ fn what(step: Progress, shown: &Shown) -> String {
         Progress::Plan => "Five seeds along one needle through the gland.".to_owned(),
         Progress::Place => {
             let which = plan::at_work(shown).map_or_else(String::new, |text| text + " ");
-            format!("{which}Bring the tip to the entry of the planned path.")
+            format!("{which}Bring the tip to the entry of the path.")
         }
         Progress::Insert => "To the deepest planned seed: the button, W and S, or drag the tip in a slice.".to_owned(),
         Progress::Drop => {

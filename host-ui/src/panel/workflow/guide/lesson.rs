@@ -328,3 +328,18 @@ fn headline(shown: &Shown, membranes: &MetMembranes, seeds: &[Depths]) -> String
     let mean = format::length(mean_m);
     format!("{fault}The seeds rest {mean} from plan on average{worst}.{missing}")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Moved;
+
+    #[test]
+    fn motions_that_cancel_are_not_averaged_away() {
+        let said = |ways_mm: [f64; 5]| Moved::of(ways_mm.iter().map(|mm| mm * 1e-3)).to_string();
+        assert_eq!(said([2.0, 4.0, 3.0, 3.0, 3.0]), "+3.00 mm on average");
+        assert_eq!(
+            said([-5.6, -3.2, -0.7, 1.7, 4.2]),
+            "3.1 mm on average, some deeper and some shallower"
+        );
+    }
+}
