@@ -346,7 +346,7 @@ impl App {
     }
 
     /// Says how a run ended, with the planned seeds that are not in the tissue.
-    fn done(&self) -> Note {
+    fn end_of_run(&self) -> Note {
         let needles = self.script.needles.len();
         let seeds = all_errors(&self.shown);
         let missing = seeds.iter().filter(|(_, seed)| seed.placed.is_none()).count();
@@ -354,7 +354,7 @@ impl App {
             (0, _) => Note::done(format!("Done: {SCRIPTED_STEPS}.")),
             (n, 0) => Note::done(format!("All {n} needles are done.")),
             (n, missing) => Note::refusal(format!(
-                "All {n} needles are done, but {missing} of {} seeds were not placed: their needle did not puncture.",
+                "All {n} needles are done, but {missing} of {} seeds were not placed: the tip was outside the tissue.",
                 seeds.len()
             )),
         }
@@ -370,7 +370,7 @@ impl App {
             self.follow_run(needle, status == RunStatus::Done);
             self.shown.note = match status {
                 RunStatus::Working => None,
-                RunStatus::Done => Some(self.done()),
+                RunStatus::Done => Some(self.end_of_run()),
                 RunStatus::Failed(why) => Some(Note::refusal(format!("The run stopped: {why}"))),
             };
             if self.shown.note.is_some() {

@@ -226,12 +226,13 @@ fn rows_ui(ui: &mut egui::Ui, rows: &mut [Row]) {
             let role = ComboBox::from_id_salt(row.label)
                 .selected_text(row.part.name())
                 .width(84.0);
-            role.show_ui(ui, |ui| {
+            let role = role.show_ui(ui, |ui| {
                 for part in Part::ALL {
                     let choice = ui.selectable_value(&mut row.part, part, part.name());
                     choice.on_hover_text(part.meaning());
                 }
             });
+            role.response.labelled_by(label.id);
             let [least, most] = STIFFNESS_KPA;
             let stiffness = DragValue::new(&mut row.young_kpa)
                 .range(least..=most)

@@ -75,9 +75,9 @@ impl Shown {
 
     /// Returns whether the tip is on the planned path, at its entry or deeper.
     fn is_placed(&self) -> bool {
-        let beside_m = self.off_path_m().unwrap_or(f64::INFINITY);
+        let off_path_m = self.off_path_m().unwrap_or(f64::INFINITY);
         let depth_m = self.path_depth_m().unwrap_or(f64::NEG_INFINITY);
-        beside_m <= PLACED_WITHIN_M && depth_m >= -PLACED_BEFORE_M
+        off_path_m <= PLACED_WITHIN_M && depth_m >= -PLACED_BEFORE_M
     }
 
     pub(super) fn take_line_wait(&mut self) {

@@ -1,7 +1,7 @@
 //! The real window in a test harness.
 //!
 //! `build_eframe` of egui_kittest is not used: its feature turns on the accessibility of eframe, whose macros change
-//! features of packages beneath everything, and 149 packages would be compiled twice between `make run` and `make test`.
+//! features of packages beneath everything, which would be compiled twice between `make run` and `make test`.
 
 use eframe::App as _;
 use eframe::egui_wgpu::RendererOptions;
