@@ -3,6 +3,7 @@
 //! Layout: `MAGIC`, SHA-256 of scene and answers, answers (postcard). Nothing is used before the digest is verified;
 //! answers of another wall and non-finite numbers are refused.
 
+use crate::environment::user_folder;
 use crate::pieces;
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -35,10 +36,7 @@ pub enum KeptError {
 
 /// Returns `$XDG_CACHE_HOME/stylet/probes`, by default under `~/.cache`; `None` for a user without a home.
 pub fn default_folder() -> Option<PathBuf> {
-    let from = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
-    let cache = from("XDG_CACHE_HOME").filter(|p| p.is_absolute());
-    let cache = cache.or_else(|| from("HOME").map(|home| home.join(".cache")));
-    cache.map(|cache| cache.join("stylet/probes"))
+    Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("stylet/probes"))
 }
 
 /// Returns the file of a scene and its probe.

@@ -1,5 +1,6 @@
 //! A flight recording on disk: magic, SHA-256 of the rest, and the recording itself.
 
+use crate::environment::user_folder;
 use crate::pieces;
 use crate::rt::haptic_tape::HapticFlight;
 use crate::rt::second::SecondFlight;
@@ -152,10 +153,7 @@ fn other_format(bytes: &[u8]) -> Problem {
 
 /// Returns the default folder of the recordings: `$XDG_STATE_HOME/stylet/flights`, by default under `~/.local/state`.
 pub fn default_folder() -> PathBuf {
-    let from = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
-    let state = from("XDG_STATE_HOME")
-        .filter(|p| p.is_absolute())
-        .or_else(|| from("HOME").map(|home| home.join(".local/state")));
+    let state = user_folder("XDG_STATE_HOME", ".local/state");
     state.unwrap_or_else(std::env::temp_dir).join("stylet/flights")
 }
 
