@@ -7,7 +7,7 @@ use crate::environment::user_folder;
 use crate::pieces;
 use sha2::{Digest, Sha256};
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use stylet_sim::probe::{PADS_APART_M, ProbeShape, SolvedProbe};
 use stylet_sim::scene::Scene;
@@ -77,18 +77,7 @@ pub fn write(path: &Path, scene: &Scene, shape: &ProbeShape, solved: &SolvedProb
     let answers = postcard::to_allocvec(solved).map_err(|why| io(io::Error::other(why)))?;
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(io)?;
-    let part = path.with_extension(format!("{}.part", std::process::id()));
-    let written = fs::File::create(&part).and_then(|mut file| {
-        file.write_all(&MAGIC)?;
-        file.write_all(&joined(scene, shape, &answers))?;
-        pieces::write(&mut file, &answers)?;
-        file.sync_all()?;
-        fs::rename(&part, path)
-    });
-    written.map_err(|why| {
-        let _ = fs::remove_file(&part);
-        io(why)
-    })
+    pieces::write(path, &[&MAGIC, &joined(scene, shape, &answers), &answers]).map_err(io)
 }
 
 fn joined(scene: &Scene, shape: &ProbeShape, answers: &[u8]) -> [u8; DIGEST] {

@@ -7,7 +7,6 @@ use crate::rt::second::SecondFlight;
 use crate::rt::tissue_tape::TissueFlight;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use stylet_hw::DeviceInfo;
 use stylet_sim::line::LineSource;
@@ -105,21 +104,8 @@ pub struct SecondFigures {
 impl Flight {
     /// Writes the file atomically.
     pub fn write(&self, path: &Path) -> Result<(), FlightError> {
-        let failed = |e: std::io::Error| FlightError::new(path, Problem::Io(e));
         let body = postcard::to_stdvec(self).map_err(|e| FlightError::new(path, Problem::Encoding(e)))?;
-        let unfinished = path.with_extension("part");
-        let written = std::fs::File::create(&unfinished).and_then(|mut file| {
-            file.write_all(MAGIC)?;
-            file.write_all(&Sha256::digest(&body))?;
-            pieces::write(&mut file, &body)?;
-            file.sync_all()
-        });
-        if let Err(why) = written {
-            // An incomplete file is of no use.
-            let _ = std::fs::remove_file(&unfinished);
-            return Err(failed(why));
-        }
-        std::fs::rename(&unfinished, path).map_err(failed)
+        pieces::write(path, &[MAGIC, &Sha256::digest(&body), &body]).map_err(|e| FlightError::new(path, Problem::Io(e)))
     }
 
     /// Reads a file of [`Flight::write`]; anything else is refused with a reason.
