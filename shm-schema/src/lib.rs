@@ -111,10 +111,10 @@ pub use scene::{SceneHeader, SceneId, StructureInfo, UploadHeader, UploadStructu
 pub use second::{SecondRecord, SecondState};
 pub use session::{Session, ThreadReport};
 pub use snapshot::{LeftNeedlePose, MAX_BEND_POINTS, SeedPose, SnapshotHeader, Vertex, touching};
-pub use state::{Fault, HapticState, Phase, flags};
+pub use state::{Fault, HapticState, flags};
 pub use stylet_settings::{
     BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_LEFT_NEEDLES, MAX_NODES, MAX_STRUCTURES, PARAMETER_COUNT,
-    PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet, ParameterSpec,
+    PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet, ParameterSpec, Phase,
     ProblemList, SEED_LENGTH_M, SEED_RADIUS_M, TOUCHING_M, folding,
 };
 pub use text::Text;

@@ -2,7 +2,7 @@
 
 use crate::DeadlineTotals;
 use bytemuck::{Pod, Zeroable};
-use num_enum::{IntoPrimitive, TryFromPrimitive};
+use num_enum::IntoPrimitive;
 use serde::{Deserialize, Serialize};
 
 /// One tick, as seen by the operator's program. Written only by the haptic thread.
@@ -94,7 +94,7 @@ pub struct HapticState {
     pub tissue_since_start: DeadlineTotals,
     /// Totals of the tissue loop since the force was last turned on.
     pub tissue_since_armed: DeadlineTotals,
-    /// [`Phase`] by number.
+    /// [`crate::Phase`] by number.
     pub phase: u32,
     /// [`Fault`] by number.
     pub fault: u32,
@@ -138,37 +138,6 @@ pub mod flags {
     pub const HAND_EMPTY: u32 = 1 << 11;
     /// The hand moves for a host, or waits for its renewal ([`crate::Request::KeepMoving`]).
     pub const IN_MOTION: u32 = 1 << 12;
-}
-
-/// Phase of needle and tissue (paper eq. 6), by stable number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
-#[repr(u32)]
-pub enum Phase {
-    /// No contact.
-    Outside = 0,
-    /// The membrane is pushed in and holds.
-    Contraction = 1,
-    /// The needle goes in through the tissue.
-    Penetration = 2,
-    /// The needle comes out.
-    Retraction = 3,
-    /// The needle is at rest in the tissue.
-    Hold = 4,
-}
-
-numbered!(Phase);
-
-impl Phase {
-    /// Name shown to users.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Outside => "outside",
-            Self::Contraction => "membrane contraction",
-            Self::Penetration => "penetration",
-            Self::Retraction => "retraction",
-            Self::Hold => "hold",
-        }
-    }
 }
 
 coded!(

@@ -28,6 +28,11 @@ pub enum InputError {
     NotText,
 }
 
+/// Returns whether the name of a file has this ending, in capitals or not.
+pub fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|own| own.eq_ignore_ascii_case(ending))
+}
+
 /// Returns a regular file and its size in bytes. Refuses a pipe at once, even one
 /// without a writer.
 pub fn open(path: &Path) -> Result<(File, u64), InputError> {

@@ -2,11 +2,13 @@
 //! of the two files.
 
 use super::CommandError;
+use super::dicom::identity_of;
 use super::dose::write;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use stylet_base::format::printable;
-use stylet_base::{input, write_whole};
+use stylet_base::input::{self, has_ending};
+use stylet_base::write_whole;
 use stylet_dose::Source;
 use stylet_files::convert::{can_hold_labels, write_labels};
 use stylet_files::dicom::images::Slice;
@@ -14,8 +16,7 @@ use stylet_files::dicom::plan::{self, SeedPlan};
 use stylet_files::dicom::segmentation::{self, is_segmentation};
 use stylet_files::dicom::structures::write::{Outlined, Written, of_set, of_voxels};
 use stylet_files::dicom::structures::{self, StructureSet};
-use stylet_files::dicom::{self, Identity, RT_DOSE, RT_PLAN, Shared};
-use stylet_files::together;
+use stylet_files::dicom::{self, Identity, RT_DOSE, RT_PLAN};
 use stylet_files::{self as files, FileError, bytes, scene};
 use stylet_implant::plan::exchange::seeds_of_source;
 use stylet_implant::plan::seeds;
@@ -186,16 +187,9 @@ impl ConvertArgs {
         self.written()
     }
 
-    /// Returns the identity of --like, else that of the input file, else that of the plan of a dose;
-    /// files of two patients or frames are refused.
+    /// Returns the identity of --like, else that of the input file, else that of the plan of a dose.
     fn identity(&self) -> Result<Option<Identity>, CommandError> {
-        if let Some(like) = &self.like
-            && Identity::of_path(like)?.is_none()
-        {
-            return Err(format!("{}: it names no patient; --like needs a DICOM file", like.display()).into());
-        }
-        let files = [self.like.as_deref(), Some(&self.from), self.plan.as_deref()];
-        Ok(together(&files, Shared::Frame)?)
+        identity_of(self.like.as_deref(), &[Some(&*self.from), self.plan.as_deref()])
     }
 
     fn seeds_to_plan(&self) -> Result<(), CommandError> {
@@ -326,10 +320,6 @@ fn is_dose(path: &Path) -> Result<bool, CommandError> {
 fn names(voxels: &files::Voxels) -> String {
     let each: Vec<String> = voxels.names.iter().map(|(l, n)| format!("{l}={n}")).collect();
     each.join(", ")
-}
-
-fn has_ending(path: &Path, ending: &str) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
 fn first_line(path: &Path) -> Result<String, CommandError> {

@@ -153,19 +153,22 @@ impl DicomArgs {
 
     /// Returns the identity of the first file that has one; all others must agree with it.
     fn identity(&self) -> Result<Identity, CommandError> {
-        if let Some(like) = &self.like
-            && Identity::of_path(like)?.is_none()
-        {
-            return Err(format!("{}: it names no patient; --like needs a DICOM file", like.display()).into());
-        }
-        let files = [
-            self.like.as_deref(),
-            Some(&self.structures),
-            Some(&self.seeds),
-            self.images.as_deref(),
-        ];
-        Ok(together(&files, Shared::Frame)?.unwrap_or_default().completed())
+        let files = [Some(&*self.structures), Some(&*self.seeds), self.images.as_deref()];
+        Ok(identity_of(self.like.as_deref(), &files)?
+            .unwrap_or_default()
+            .completed())
     }
+}
+
+/// Returns the identity of --like, else that of the first file that has one; files of two patients or frames are
+/// refused.
+pub fn identity_of(like: Option<&Path>, files: &[Option<&Path>]) -> Result<Option<Identity>, CommandError> {
+    if let Some(like) = like
+        && Identity::of_path(like)?.is_none()
+    {
+        return Err(format!("{}: it names no patient; --like needs a DICOM file", like.display()).into());
+    }
+    Ok(together(&[&[like][..], files].concat(), Shared::Frame)?)
 }
 
 /// Structures with their images.

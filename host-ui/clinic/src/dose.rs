@@ -13,6 +13,7 @@ use stylet_dose::picture::Curve;
 use stylet_dose::report::{Judge, Verdict};
 use stylet_dose::seed::Seed;
 use stylet_dose::{DoseGrid, DosePoints, picture, structure};
+use stylet_files::bytes::file_name;
 use stylet_files::dicom::Shared;
 use stylet_files::together;
 use stylet_implant::provenance;
@@ -199,12 +200,6 @@ impl DoseArgs {
             is_for_ever: self.common.is_for_ever(),
         })
     }
-}
-
-/// Returns the name of a file, without its folder.
-pub fn file_name(path: &Path) -> String {
-    path.file_name()
-        .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
 /// Computes the dose on a grid around the seeds, and around a box (m) if one is given; with

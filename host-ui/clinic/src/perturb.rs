@@ -1,7 +1,7 @@
 //! The command `host-ui perturb`.
 
 use super::CommandError;
-use super::dose::common::{Common, Loaded, errors_of, within};
+use super::dose::common::{Common, EdemaArgs, Loaded, errors_of, within};
 use super::dose::write;
 use clap::Args;
 use serde_json::json;
@@ -11,7 +11,7 @@ use stylet_base::interrupt::Interrupt;
 use stylet_base::output::new_folder;
 use stylet_base::progress_bar::LongTask;
 use stylet_dose::criterion::{Criterion, CriterionCount};
-use stylet_dose::edema::{Edema, Swelling};
+use stylet_dose::edema::Swelling;
 use stylet_dose::perturb::{self, Errors};
 use stylet_dose::report::Judge;
 use stylet_files::dicom::Shared;
@@ -79,12 +79,8 @@ pub struct PerturbArgs {
     /// Probability that a seed is lost, 0 to 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.0)]
     loss: f64,
-    /// Swelling of the gland at the implant, in percent of its volume
-    #[arg(long, value_name = "PERCENT", requires = "edema_half_life")]
-    edema: Option<f64>,
-    /// Time in which half of the swelling is lost
-    #[arg(long, value_name = "DAYS", requires = "edema")]
-    edema_half_life: Option<f64>,
+    #[command(flatten)]
+    swelling: EdemaArgs,
     /// Additional criterion: "D90>=130.5" of the target (Gy), "Urethra V150<=10" (percent); may be
     /// given several times
     #[arg(long = "criterion", value_name = "CRITERION")]
@@ -118,7 +114,7 @@ impl PerturbArgs {
     pub fn run(self) -> Result<(), CommandError> {
         let c = &self.common;
         let errors = self.errors()?;
-        let edema = self.edema()?;
+        let edema = c.edema(&self.swelling)?;
         together(&[Some(&self.plan), Some(&self.structures)], Shared::Frame)?;
         let loaded = c.load(&self.plan)?;
         let kernel = &loaded.kernel;
@@ -160,8 +156,8 @@ impl PerturbArgs {
         result["shift_mm"] = json!(self.shift_mm.map(|shift| shift.0));
         result["shift_sigma_mm"] = json!(self.shift_sigma_mm);
         result["loss"] = json!(self.loss);
-        result["edema_percent"] = json!(self.edema);
-        result["edema_half_life_days"] = json!(self.edema_half_life);
+        result["edema_percent"] = json!(self.swelling.edema);
+        result["edema_half_life_days"] = json!(self.swelling.edema_half_life);
         result["random_seed"] = json!(self.seed);
         result["trials"] = json!(trials.len());
         result["trials_asked"] = json!(self.trials);
@@ -211,20 +207,6 @@ impl PerturbArgs {
             loss: self.loss,
             ..own
         })
-    }
-
-    fn edema(&self) -> Result<Option<Edema>, CommandError> {
-        let (Some(percent), Some(days)) = (self.edema, self.edema_half_life) else {
-            return Ok(None);
-        };
-        within("--edema", percent, 0.0, 300.0)?;
-        within("--edema-half-life", days, 0.1, 1000.0)?;
-        if !self.common.is_for_ever() {
-            return Err(
-                "--edema is for the dose of the whole life of the seeds; leave --from-days and --to-days out".into(),
-            );
-        }
-        Ok(Some(Edema::of_days(percent / 100.0, days)))
     }
 
     /// Returns the needle of each seed, counted from 0, if the errors depend on it; refuses a file

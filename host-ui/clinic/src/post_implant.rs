@@ -2,16 +2,16 @@
 //! and on day 30.
 
 use super::CommandError;
-use super::dose::common::{Common, Loaded, within};
-use super::dose::{POINTS_FOR_DOSE, file_name, write};
+use super::dose::common::{Common, EdemaArgs, Loaded, within};
+use super::dose::{POINTS_FOR_DOSE, write};
 use crate::sheet::{self, Column, Implant, State};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use stylet_base::output::new_folder;
 use stylet_base::write_whole;
 use stylet_dose::decay::days_to_s;
-use stylet_dose::edema::Edema;
 use stylet_dose::{Seed, Structure};
+use stylet_files::bytes::file_name;
 use stylet_files::dicom::Shared;
 use stylet_files::together;
 use stylet_implant::provenance;
@@ -63,12 +63,8 @@ pub struct PostImplantArgs {
     /// Days after the implant on which --day30 was imaged
     #[arg(long, value_name = "DAYS", default_value_t = 30.0, requires = "day30")]
     imaged_after: f64,
-    /// Swelling at the implant, in percent of the volume without it
-    #[arg(long, value_name = "PERCENT", requires = "edema_half_life")]
-    edema: Option<f64>,
-    /// Time in which half of the swelling is lost
-    #[arg(long, value_name = "DAYS", requires = "edema")]
-    edema_half_life: Option<f64>,
+    #[command(flatten)]
+    swelling: EdemaArgs,
 }
 
 /// Seeds and structures of the plan, the reference of the other states.
@@ -83,12 +79,7 @@ impl PostImplantArgs {
     pub fn run(self) -> Result<(), CommandError> {
         let c = &self.common;
         within("--imaged-after", self.imaged_after, 0.0, 400.0)?;
-        let edema = self.edema()?;
-        if edema.is_some() && !c.is_for_ever() {
-            return Err(
-                "--edema is for the dose of the whole life of the seeds; leave --from-days and --to-days out".into(),
-            );
-        }
+        let edema = c.edema(&self.swelling)?;
         self.compare_files()?;
         let loaded = c.load(&self.planned)?;
         let (structures, target) = c.structures(&self.structures, &loaded.seeds, POINTS_FOR_DOSE / 3)?;
@@ -153,15 +144,6 @@ impl PostImplantArgs {
             together(&[of_plan.as_slice(), &of_day].concat(), Shared::Patient)?;
         }
         Ok(())
-    }
-
-    fn edema(&self) -> Result<Option<Edema>, CommandError> {
-        let (Some(percent), Some(days)) = (self.edema, self.edema_half_life) else {
-            return Ok(None);
-        };
-        within("--edema", percent, 0.0, 300.0)?;
-        within("--edema-half-life", days, 0.1, 1000.0)?;
-        Ok(Some(Edema::of_days(percent / 100.0, days)))
     }
 
     /// Reads the seeds of a day after the implant: in structures of their own, or fitted to the

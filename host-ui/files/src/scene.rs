@@ -12,6 +12,7 @@ use crate::error::ContentError;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use stylet_anatomy::{Beyond, Layer, Material, Role, Surroundings};
+use stylet_base::input::has_ending;
 pub use write::to_text;
 
 const MAX_BYTES: usize = 1 << 20;
@@ -138,7 +139,7 @@ struct Device {
 
 /// Returns whether a file is a scene file, the only format here that is recognised by its name.
 pub fn is_scene(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+    has_ending(path, "toml")
 }
 
 /// Reads a scene file.

@@ -1,6 +1,6 @@
 //! The host of a measurement: reports when it saw data, and passes requests on.
 
-use crate::{Ended, wait};
+use crate::Ended;
 use std::time::Duration;
 use stylet_ports::{self as service, Node, Publisher, ServiceError, SliceSubscriber, Subscriber};
 use stylet_shm_schema::affinity::{Left, now_ns};
@@ -40,7 +40,7 @@ pub fn watch(instance: &Instance, socket: &mut Socket) -> Result<Ended, Ended> {
         let Some(ports) = &mut ports else {
             // Waits for a core and its bridge.
             ports = Node::join(instance).and_then(Ports::new).ok();
-            wait(socket, CONNECT_EVERY);
+            socket.wait(CONNECT_EVERY);
             socket.receive()?;
             continue;
         };

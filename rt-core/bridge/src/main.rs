@@ -8,7 +8,6 @@ mod load;
 mod ports;
 
 use ports::Ports;
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::ffi::OsString;
 use std::os::fd::AsFd;
 use std::path::PathBuf;
@@ -93,7 +92,7 @@ fn carry_out(arguments: &[OsString], socket: &mut Socket) -> Result<Ended, Ended
 
 fn serve(epoch: &Epoch, socket: &mut Socket) -> Result<Ended, Ended> {
     let start = loop {
-        wait(socket, Duration::from_secs(1));
+        socket.wait(Duration::from_secs(1));
         match socket.receive()? {
             Some(packet) if packet.kind == Kind::Start => break packet.value::<Start>().ok_or(Ended::Arguments)?,
             _ => {}
@@ -103,17 +102,8 @@ fn serve(epoch: &Epoch, socket: &mut Socket) -> Result<Ended, Ended> {
     socket.send(Kind::Ready, &[], None)?;
     loop {
         bridge.pass(socket)?;
-        wait(socket, LOOK_EVERY);
+        socket.wait(LOOK_EVERY);
     }
-}
-
-/// Waits until something arrives, at most `longest`.
-fn wait(socket: &Socket, longest: Duration) {
-    let longest = Timespec::try_from(longest).ok();
-    let _ = poll(
-        &mut [PollFd::from_borrowed_fd(socket.as_fd(), PollFlags::IN)],
-        longest.as_ref(),
-    );
 }
 
 /// State of this process.

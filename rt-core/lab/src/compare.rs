@@ -249,7 +249,8 @@ fn ratio(ours_us: &Turn, others_us: &Turn) -> Turn {
     std::array::from_fn(|i| ours_us[i].zip(others_us[i]).map(|(a, b)| a / b))
 }
 
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+/// Returns the median; of an even number of values, the mean of both in the middle.
+pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut all: Vec<f64> = values.collect();
     all.sort_by(f64::total_cmp);
     let n = all.len();

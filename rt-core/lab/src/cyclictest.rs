@@ -1,5 +1,6 @@
 //! Wake-ups of every measured core in the layout of `cyclictest --json`, for programs that read its files.
 
+use crate::disk::{self, DiskError};
 use crate::machine::Preemption;
 use crate::raw::Raw;
 use crate::report::Report;
@@ -96,7 +97,7 @@ struct Thread {
 }
 
 /// Returns the file.
-pub fn json(r: &Report, raw: &Raw) -> serde_json::Result<String> {
+pub fn json(r: &Report, raw: &Raw) -> Result<String, DiskError> {
     let fact = |group: &str, name: &str| {
         let found = r.facts.iter().find(|f| f.group == group && f.name == name);
         found.map_or("", |f| &f.value)
@@ -142,5 +143,5 @@ pub fn json(r: &Report, raw: &Raw) -> serde_json::Result<String> {
         resolution_in_ns: 0,
         thread,
     };
-    Ok(serde_json::to_string_pretty(&file)? + "\n")
+    disk::json(&file)
 }

@@ -72,9 +72,14 @@ pub fn make(folder: &Path) -> Result<(), DiskError> {
     })
 }
 
+/// Returns a report as its file holds it.
+pub fn json(report: &impl Serialize) -> Result<String, DiskError> {
+    Ok(serde_json::to_string_pretty(report)? + "\n")
+}
+
 /// Writes a report as `NAME.json` and `NAME.html` into `folder`, and prints their paths.
 pub fn write_report(folder: &Path, name: &str, report: &impl Serialize, page: &str) -> Result<(), DiskError> {
-    let json = serde_json::to_string_pretty(report)? + "\n";
+    let json = json(report)?;
     make(folder)?;
     for (ending, text) in [("html", page), ("json", &json)] {
         let path = folder.join(format!("{name}.{ending}"));

@@ -1,7 +1,7 @@
 //! The files of a measurement: report, raw data, and what is computed from them, each with its digest.
 
 use crate::cyclictest;
-use crate::disk::DiskError;
+use crate::disk::{self, DiskError};
 use crate::html;
 use crate::plots::DrawError;
 use crate::provenance::sha256;
@@ -39,21 +39,16 @@ pub fn write(folder: &Path, report: &mut Report, raw: &Raw) -> Result<(), FilesE
     for (name, text) in &derived {
         put(name, text.as_bytes())?;
     }
-    Ok(put(JSON, seal(&text(report)?).as_bytes())?)
+    Ok(put(JSON, seal(&disk::json(report)?).as_bytes())?)
 }
 
 /// Returns the files that report and raw data determine.
 pub fn derived(report: &Report, raw: &Raw) -> Result<[(&'static str, String); 3], FilesError> {
     Ok([
-        (CYCLICTEST, cyclictest::json(report, raw).map_err(DiskError::from)?),
+        (CYCLICTEST, cyclictest::json(report, raw)?),
         (OSADL, html::osadl(report, raw)?),
         (PAGE, html::page(report, raw)?),
     ])
-}
-
-/// Returns the report as its file holds it.
-pub fn text(report: &Report) -> Result<String, DiskError> {
-    Ok(serde_json::to_string_pretty(report)? + "\n")
 }
 
 #[cfg(test)]

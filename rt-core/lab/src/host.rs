@@ -3,7 +3,7 @@
 //! The observer is a separate process, like every host: the force process maps no memory that a host could write.
 
 use crate::sample::{Batched, PARTS};
-use std::process::{Child, Command, Stdio};
+use std::process::Child;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -91,13 +91,7 @@ struct Eyes {
 
 impl Eyes {
     fn open(instance: &Instance) -> Result<Self, HostError> {
-        let (socket, end) = Socket::pair().map_err(HostError::NotStarted)?;
-        let process = Command::new(control::program())
-            .args(["host", instance.name()])
-            .stdin(Stdio::from(end))
-            .stdout(Stdio::null())
-            .spawn()
-            .map_err(HostError::NotStarted)?;
+        let (socket, process) = control::watcher("host", instance).map_err(HostError::NotStarted)?;
         Ok(Self { process, socket })
     }
 }

@@ -156,7 +156,9 @@ impl Running {
         let all = load.work(cores);
         for (index, work) in all.iter().enumerate() {
             if *work == LoadProcess::Ui {
-                running.start_host(instance).map_err(LoadError::Start)?;
+                let (socket, process) = control::watcher("load", instance).map_err(LoadError::Start)?;
+                running.processes.push(process);
+                running.hosts.push(socket);
                 continue;
             }
             let name = work.to_possible_value().expect("no variant is skipped");
@@ -175,18 +177,6 @@ impl Running {
             running.processes.push(window(&program, instance)?);
         }
         Ok(running)
-    }
-
-    fn start_host(&mut self, instance: &Instance) -> io::Result<()> {
-        let (socket, end) = Socket::pair()?;
-        let mut command = Command::new(control::program());
-        command
-            .args(["load", instance.name()])
-            .stdin(Stdio::from(end))
-            .stdout(Stdio::null());
-        self.processes.push(command.spawn()?);
-        self.hosts.push(socket);
-        Ok(())
     }
 
     /// Fails if a process of the load has ended early: the load was then incomplete.

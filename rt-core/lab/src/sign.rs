@@ -72,9 +72,7 @@ pub struct Signer {
 
 /// Returns the signature that belongs to a file: its name with `.sig`.
 pub fn signature_of(file: &Path) -> PathBuf {
-    let mut name = file.as_os_str().to_owned();
-    name.push(".sig");
-    name.into()
+    file.with_added_extension("sig")
 }
 
 /// Checks the requirements of signing before a long measurement.

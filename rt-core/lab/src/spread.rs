@@ -1,6 +1,7 @@
 //! The spread between runs: `latency --repeat` measures some times, each into a folder of its own, and says how far the
 //! runs differ. The interval of a percentile covers its own run alone.
 
+use crate::compare::median;
 use crate::disk::{self, DiskError};
 use crate::report::JSON;
 use crate::saved::{Saved, Times};
@@ -25,17 +26,13 @@ struct Between {
 
 impl Between {
     fn of(name: &str, us: Vec<Option<f64>>) -> Self {
-        let mut known: Vec<f64> = us.iter().flatten().copied().collect();
-        known.sort_by(f64::total_cmp);
-        let middle = known
-            .get(known.len() / 2)
-            .zip(known.get(known.len().saturating_sub(1) / 2));
+        let known = || us.iter().flatten().copied();
         Self {
             name: name.to_owned(),
+            least_us: known().min_by(f64::total_cmp),
+            median_us: median(known()),
+            largest_us: known().max_by(f64::total_cmp),
             us,
-            least_us: known.first().copied(),
-            median_us: middle.map(|(a, b)| (a + b) / 2.0),
-            largest_us: known.last().copied(),
         }
     }
 }
@@ -91,16 +88,12 @@ pub fn write(of: &Path) -> Result<(), DiskError> {
         }
     }
     println!("{}", of.join(SPREAD).display());
-    Ok(write_whole(&of.join(SPREAD), text(&spread)?.as_bytes())?)
-}
-
-fn text(spread: &Spread) -> Result<String, DiskError> {
-    Ok(serde_json::to_string_pretty(spread)? + "\n")
+    Ok(write_whole(&of.join(SPREAD), disk::json(&spread)?.as_bytes())?)
 }
 
 /// Returns what is wrong with the spread, whose reports are checked by themselves.
 pub fn problem(of: &Path) -> Result<Option<String>, DiskError> {
-    let is_so = disk::read_text(&of.join(SPREAD))? == text(&read(of)?)?;
+    let is_so = disk::read_text(&of.join(SPREAD))? == disk::json(&read(of)?)?;
     Ok((!is_so).then(|| format!("{SPREAD}: not the spread of the runs in this folder")))
 }
 

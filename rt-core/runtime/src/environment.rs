@@ -16,6 +16,13 @@ const KEPT: [&str; 7] = [
 ];
 const RUNTIME_FOLDER: &str = "XDG_RUNTIME_DIR";
 
+/// Returns the user's folder of this variable, by default one below the home folder; `None` for a user without a home.
+pub(crate) fn user_folder(variable: &str, below_home: &str) -> Option<PathBuf> {
+    let from = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
+    let own = from(variable).filter(|folder| folder.is_absolute());
+    own.or_else(|| Some(from("HOME")?.join(below_home)))
+}
+
 /// Removes the user's variables if the kernel gave this program rights that its user lacks (`setcap`). Call it first in
 /// `main`.
 ///

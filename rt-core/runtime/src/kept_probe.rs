@@ -3,10 +3,11 @@
 //! Layout: `MAGIC`, SHA-256 of scene and answers, answers (postcard). Nothing is used before the digest is verified;
 //! answers of another wall and non-finite numbers are refused.
 
+use crate::environment::user_folder;
 use crate::pieces;
 use sha2::{Digest, Sha256};
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use stylet_sim::probe::{PADS_APART_M, ProbeShape, SolvedProbe};
 use stylet_sim::scene::Scene;
@@ -35,10 +36,7 @@ pub enum KeptError {
 
 /// Returns `$XDG_CACHE_HOME/stylet/probes`, by default under `~/.cache`; `None` for a user without a home.
 pub fn default_folder() -> Option<PathBuf> {
-    let from = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
-    let cache = from("XDG_CACHE_HOME").filter(|p| p.is_absolute());
-    let cache = cache.or_else(|| from("HOME").map(|home| home.join(".cache")));
-    cache.map(|cache| cache.join("stylet/probes"))
+    Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("stylet/probes"))
 }
 
 /// Returns the file of a scene and its probe.
@@ -79,18 +77,7 @@ pub fn write(path: &Path, scene: &Scene, shape: &ProbeShape, solved: &SolvedProb
     let answers = postcard::to_allocvec(solved).map_err(|why| io(io::Error::other(why)))?;
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(io)?;
-    let part = path.with_extension(format!("{}.part", std::process::id()));
-    let written = fs::File::create(&part).and_then(|mut file| {
-        file.write_all(&MAGIC)?;
-        file.write_all(&joined(scene, shape, &answers))?;
-        pieces::write(&mut file, &answers)?;
-        file.sync_all()?;
-        fs::rename(&part, path)
-    });
-    written.map_err(|why| {
-        let _ = fs::remove_file(&part);
-        io(why)
-    })
+    pieces::write(path, &[&MAGIC, &joined(scene, shape, &answers), &answers]).map_err(io)
 }
 
 fn joined(scene: &Scene, shape: &ProbeShape, answers: &[u8]) -> [u8; DIGEST] {

@@ -2,7 +2,7 @@
 //!
 //! A non-preemptible kernel keeps the processor for a whole copy: 20 MB in one call take 5 ms.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::Path;
 
@@ -24,9 +24,20 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     }
 }
 
-/// Writes everything, as `write_all` does.
-pub fn write(file: &mut File, bytes: &[u8]) -> io::Result<()> {
-    bytes.chunks(PIECE).try_for_each(|piece| file.write_all(piece))
+/// Writes a file of these parts, which is on the disk before it gets its name.
+pub fn write(path: &Path, parts: &[&[u8]]) -> io::Result<()> {
+    let unfinished = path.with_extension(format!("{}.part", std::process::id()));
+    let written = File::create(&unfinished).and_then(|mut file| {
+        let mut pieces = parts.iter().flat_map(|part| part.chunks(PIECE));
+        pieces.try_for_each(|piece| file.write_all(piece))?;
+        file.sync_all()?;
+        fs::rename(&unfinished, path)
+    });
+    if written.is_err() {
+        // An incomplete file is of no use.
+        let _ = fs::remove_file(&unfinished);
+    }
+    written
 }
 
 #[cfg(test)]
@@ -38,7 +49,7 @@ mod tests {
         let path = std::env::temp_dir().join(format!("stylet-pieces-{}", std::process::id()));
         let bytes: Vec<u8> = (0..3 * PIECE + 7).map(|n| (n % 251) as u8).collect();
         for part in [&bytes[..], &bytes[..PIECE], &[]] {
-            write(&mut File::create(&path).unwrap(), part).unwrap();
+            write(&path, &[part]).unwrap();
             assert_eq!(read(&path).unwrap(), part);
         }
         std::fs::remove_file(&path).unwrap();

@@ -39,6 +39,21 @@ impl Simd {
     }
 }
 
+/// Returns the sum of products, in `N` sums side by side.
+#[inline(always)]
+pub(crate) fn dot<const N: usize>(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; N];
+    let (of_a, of_b) = (a.as_chunks::<N>(), b.as_chunks::<N>());
+    for (a, b) in of_a.0.iter().zip(of_b.0) {
+        for n in 0..N {
+            sums[n] += a[n] * b[n];
+        }
+    }
+    let whole = N * of_a.0.len().min(of_b.0.len());
+    let rest: f64 = a[whole..].iter().zip(&b[whole..]).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
+}
+
 /// Compiles the caller's function `generic` for each set of instructions and calls the one for `$simd`: with the types
 /// `$portable`, or `$wide` where there is AVX2 or more.
 ///

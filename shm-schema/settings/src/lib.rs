@@ -13,6 +13,7 @@
 
 #![warn(missing_docs)]
 
+mod phase;
 mod problem;
 mod problem_list;
 mod scene;
@@ -20,6 +21,7 @@ mod seed;
 mod set;
 mod table;
 
+pub use phase::Phase;
 pub use problem::{ParameterProblem, ParameterProblems, folding};
 pub use problem_list::ProblemList;
 pub use scene::{BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_LEFT_NEEDLES, MAX_NODES, MAX_STRUCTURES};

@@ -1,6 +1,7 @@
 //! Packets between both processes: a kind, plain bytes, and for some the descriptor of sealed memory.
 
 use bytemuck::{AnyBitPattern, Pod};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{MemfdFlags, SealFlags};
 use rustix::net::{
     AddressFamily, RecvAncillaryBuffer, RecvAncillaryMessage, RecvFlags, SendAncillaryBuffer, SendAncillaryMessage,
@@ -9,8 +10,9 @@ use rustix::net::{
 use std::fs::File;
 use std::io::{self, IoSlice, IoSliceMut, Write};
 use std::mem::MaybeUninit;
-use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::fd::{BorrowedFd, OwnedFd};
 use std::os::unix::fs::FileExt;
+use std::time::Duration;
 #[cfg(any(doc, test))]
 use stylet_shm_schema::*;
 
@@ -121,9 +123,9 @@ pub struct SeenRecords {
 /// The largest packet: a batch of records, or a rehearsal.
 pub const MOST_BYTES: usize = 64 << 10;
 /// Polling interval of the bridge, and of the host of a measurement.
-pub const LOOK_EVERY: std::time::Duration = std::time::Duration::from_millis(1);
+pub const LOOK_EVERY: Duration = Duration::from_millis(1);
 /// Interval of the bridge's heartbeat.
-pub const ALIVE_EVERY: std::time::Duration = std::time::Duration::from_millis(50);
+pub const ALIVE_EVERY: Duration = Duration::from_millis(50);
 /// Length of the head: the kind, and four bytes that keep the rest aligned.
 const HEAD: usize = 8;
 
@@ -188,9 +190,10 @@ impl Socket {
         }
     }
 
-    /// Returns the descriptor to wait on for packets.
-    pub fn as_fd(&self) -> BorrowedFd<'_> {
-        self.end.as_fd()
+    /// Waits until something arrives, at most `longest`.
+    pub fn wait(&self, longest: Duration) {
+        let longest = Timespec::try_from(longest).ok();
+        let _ = poll(&mut [PollFd::new(&self.end, PollFlags::IN)], longest.as_ref());
     }
 
     /// Sends a packet whole; false if there is no room for it now.
@@ -286,6 +289,7 @@ pub fn unsealed<T: Pod>(memory: OwnedFd, most: usize) -> io::Result<Vec<T>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::fd::AsFd;
 
     #[test]
     fn a_packet_arrives_with_its_memory() {

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stylet_base::nuclide::Nuclide;
 use stylet_dose::decay::{Interval, days_to_s, left_after};
+use stylet_dose::edema::Edema;
 use stylet_dose::kernel::DoseKernel;
 use stylet_dose::metric::Metric;
 use stylet_dose::perturb::Errors;
@@ -63,6 +64,17 @@ pub struct Common {
     /// Folder for the results
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+}
+
+/// Swelling of the gland.
+#[derive(Args, Debug)]
+pub struct EdemaArgs {
+    /// Swelling of the gland at the implant, in percent of its volume without it
+    #[arg(long, value_name = "PERCENT", requires = "edema_half_life")]
+    pub edema: Option<f64>,
+    /// Time in which half of the swelling is lost
+    #[arg(long, value_name = "DAYS", requires = "edema")]
+    pub edema_half_life: Option<f64>,
 }
 
 /// Input of a dose computation.
@@ -213,6 +225,21 @@ impl Common {
     /// Returns whether the dose covers the whole life of the seeds.
     pub fn is_for_ever(&self) -> bool {
         self.from_days == 0.0 && self.to_days.is_none()
+    }
+
+    /// Returns the swelling that was asked for.
+    pub fn edema(&self, asked: &EdemaArgs) -> Result<Option<Edema>, CommandError> {
+        let (Some(percent), Some(days)) = (asked.edema, asked.edema_half_life) else {
+            return Ok(None);
+        };
+        within("--edema", percent, 0.0, 300.0)?;
+        within("--edema-half-life", days, 0.1, 1000.0)?;
+        if !self.is_for_ever() {
+            return Err(
+                "--edema is for the dose of the whole life of the seeds; leave --from-days and --to-days out".into(),
+            );
+        }
+        Ok(Some(Edema::of_days(percent / 100.0, days)))
     }
 
     /// Returns the reference day of the strengths, in words.

@@ -80,23 +80,25 @@ pub fn rows(implant: &Implant, columns: &[Column]) -> Vec<Row> {
     row("target", "volume", "cc", 2, &|c| Ok(target(c)?.volume_m3() * 1e6));
     let rx = implant.prescription_gy;
     for name in ["D100", "D90"] {
-        row("target", name, "Gy", 1, &|c| gy(target(c)?, name, rx));
+        row("target", name, "Gy", 1, &|c| figure(target(c)?, name, rx));
     }
     row("target", "D90", "% of prescription", 1, &|c| {
-        Ok(gy(target(c)?, "D90", rx)? / rx * 100.0)
+        Ok(figure(target(c)?, "D90", rx)? / rx * 100.0)
     });
     for name in ["V90", "V100", "V150", "V200"] {
-        row("target", name, "%", 1, &|c| percent(target(c)?, name, rx));
+        row("target", name, "%", 1, &|c| figure(target(c)?, name, rx));
     }
     for name in ["D5", "D10", "D30"] {
-        row("urethra", name, "Gy", 1, &|c| gy(organ(c, Organ::Urethra)?, name, rx));
+        row("urethra", name, "Gy", 1, &|c| {
+            figure(organ(c, Organ::Urethra)?, name, rx)
+        });
     }
     row("urethra", "V150", "cc", 3, &|c| {
         cc(organ(c, Organ::Urethra)?, "V150", rx)
     });
     row("rectum", "V100", "cc", 3, &|c| cc(organ(c, Organ::Rectum)?, "V100", rx));
     for name in ["D2cc", "D0.1cc"] {
-        row("rectum", name, "Gy", 1, &|c| gy(organ(c, Organ::Rectum)?, name, rx));
+        row("rectum", name, "Gy", 1, &|c| figure(organ(c, Organ::Rectum)?, name, rx));
     }
     row("indices", "conformity", "", 3, &|c| {
         let (inside, all) = (target(c)?.at_least_m3(rx), c.at_prescription_m3.clone()?);
@@ -119,7 +121,7 @@ pub fn rows(implant: &Implant, columns: &[Column]) -> Vec<Row> {
         let bed_gy = response.bed_gy(dose_gy?, half_life_s);
         Ok(if is_eqd2 { response.eqd2_gy(bed_gy) } else { bed_gy })
     };
-    let of_target = |c: &Column| gy(target(c)?, "D90", rx);
+    let of_target = |c: &Column| figure(target(c)?, "D90", rx);
     row("effect", "BED of target D90", "Gy", 1, &|c| {
         effect(c, &Response::PROSTATE, of_target(c), false)
     });
@@ -127,7 +129,7 @@ pub fn rows(implant: &Implant, columns: &[Column]) -> Vec<Row> {
         effect(c, &Response::PROSTATE, of_target(c), true)
     });
     for (name, organ_is, of) in [("urethra", Organ::Urethra, "D10"), ("rectum", Organ::Rectum, "D2cc")] {
-        let dose = |c: &Column| gy(organ(c, organ_is)?, of, rx);
+        let dose = |c: &Column| figure(organ(c, organ_is)?, of, rx);
         row("effect", &format!("EQD2 of {name} {of}"), "Gy", 1, &|c| {
             effect(c, &Response::LATE, dose(c), true)
         });
@@ -180,18 +182,10 @@ fn value(dvh: &Dvh, name: &str, rx_gy: f64) -> Result<Value, NotComputed> {
     }
 }
 
-fn gy(dvh: &Dvh, name: &str, rx_gy: f64) -> Cell {
-    match value(dvh, name, rx_gy)? {
-        Value::Dose { gy, .. } => Ok(gy),
-        _ => Err(format!("{name} is not a dose").into()),
-    }
-}
-
-fn percent(dvh: &Dvh, name: &str, rx_gy: f64) -> Cell {
-    match value(dvh, name, rx_gy)? {
-        Value::Volume { percent, .. } => Ok(percent),
-        _ => Err(format!("{name} is not a volume").into()),
-    }
+/// Returns a dose in Gy, or a volume in percent.
+fn figure(dvh: &Dvh, name: &str, rx_gy: f64) -> Cell {
+    let figure = value(dvh, name, rx_gy)?.main();
+    figure.ok_or_else(|| format!("{name} has no value").into())
 }
 
 fn cc(dvh: &Dvh, name: &str, rx_gy: f64) -> Cell {

@@ -3,6 +3,7 @@
 use super::Attempt;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use stylet_files::bytes::file_name;
 use stylet_host::moments::{MomentKind, STOPPED};
 
 /// Largest size of a score.
@@ -64,8 +65,8 @@ impl Class {
         match attempt {
             Ok(attempt) => {
                 self.attempts.push(Attempt {
-                    trainee: name(trainee),
-                    session: name(session),
+                    trainee: file_name(trainee),
+                    session: file_name(session),
                     ..attempt
                 });
             }
@@ -78,11 +79,6 @@ impl Class {
         let each = self.attempts.chunk_by(|a, b| a.trainee == b.trainee);
         each.map(|own| (own[0].trainee.as_str(), own)).collect()
     }
-}
-
-fn name(path: &Path) -> String {
-    path.file_name()
-        .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
 fn folders_in(folder: &Path) -> Result<Vec<PathBuf>, ClassError> {

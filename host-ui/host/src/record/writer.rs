@@ -11,6 +11,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Seek, Write};
 use std::process::ChildStdin;
+use stylet_shm_schema::affinity::now_ns;
 use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord};
 
 /// Size of a chunk: a recording cut off by a crash lacks at most the last one, about two seconds.
@@ -279,12 +280,6 @@ impl Writer<NoSeek<BufWriter<ChildStdin>>> {
 
 /// Returns the time since 1970 minus `CLOCK_MONOTONIC`, once per recording: setting the clock meanwhile causes no step.
 fn epoch_ns() -> u64 {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: `time` is valid for writes; the clock always exists on Linux.
-    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
-    let monotonic_ns = time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64;
     let since_1970 = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    since_1970
-        .map_or(0, |d| d.as_nanos() as u64)
-        .saturating_sub(monotonic_ns)
+    since_1970.map_or(0, |d| d.as_nanos() as u64).saturating_sub(now_ns())
 }

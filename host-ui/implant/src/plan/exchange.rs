@@ -4,6 +4,7 @@ use super::{ImplantPlan, PlanError, Template, file, seeds};
 use crate::readers::{Declared, SeedDefaults};
 use std::path::Path;
 use stylet_anatomy::PatientFrame;
+use stylet_base::input::has_ending;
 use stylet_dose::Source;
 use stylet_dose::decay::s_to_days;
 use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
@@ -141,10 +142,6 @@ pub fn seeds_of_source(
         seeds,
         notes: Vec::new(),
     }
-}
-
-fn has_ending(path: &Path, ending: &str) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
 #[cfg(test)]

@@ -1,59 +1,19 @@
 //! Plans in files: TOML for the whole plan, CSV for the seeds alone; mm, patient frame (RAS).
 
-use super::problem::{FORMAT, FileProblem, MAX_MM, SeedsProblem};
+use super::problem::{FileProblem, SeedsProblem};
 use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, PlanError, Template};
 use crate::readers::SeedFile;
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 use std::path::Path;
 use stylet_anatomy::PatientFrame;
 use stylet_base::input;
-use stylet_shm_schema::{MAX_SEEDS, ProblemList};
+use stylet_procedure::{NeedleFile, PlanFile, PlanProblem, TemplateFile};
+use stylet_shm_schema::ProblemList;
 
 const MAX_BYTES: u64 = 4 << 20;
-const MAX_NEEDLES: usize = 169;
 /// Distance below which the lines of seeds are one needle.
 const SAME_LINE_M: f64 = 0.5e-3;
 const HEADER: &str = "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,needle,hole";
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PlanFile {
-    format: String,
-    source: String,
-    prescription_gy: f64,
-    template: TemplateFile,
-    #[serde(default, rename = "needle")]
-    needles: Vec<NeedleFile>,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TemplateFile {
-    middle_hole_mm: [f64; 3],
-    columns: [f64; 3],
-    rows: [f64; 3],
-    inwards: [f64; 3],
-    pitch_mm: f64,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct NeedleFile {
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    hole: Option<String>,
-    entry_mm: [f64; 3],
-    direction: [f64; 3],
-    depth_mm: f64,
-    #[serde(default)]
-    retract_to_mm: f64,
-    /// Spacer; absent for loose seeds.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    spacer_mm: Option<f64>,
-    /// Distances from the entry, deepest first.
-    seed_along_mm: Vec<f64>,
-    strength_u: Vec<f64>,
-}
 
 /// Formats a plan as TOML.
 pub fn to_text(plan: &ImplantPlan, patient: &PatientFrame) -> Result<String, PlanError> {
@@ -76,7 +36,7 @@ pub fn to_text(plan: &ImplantPlan, patient: &PatientFrame) -> Result<String, Pla
         strength_u: n.seeds.iter().map(|s| s.strength_u).collect(),
     };
     let file = PlanFile {
-        format: FORMAT.to_owned(),
+        format: PlanFile::FORMAT.to_owned(),
         source: plan.source.clone(),
         prescription_gy: plan.prescription_gy,
         template: TemplateFile {
@@ -94,33 +54,19 @@ pub fn to_text(plan: &ImplantPlan, patient: &PatientFrame) -> Result<String, Pla
 /// Parses TOML; lists every problem.
 pub fn from_text(text: &str, patient: &PatientFrame) -> Result<ImplantPlan, ProblemList<FileProblem>> {
     let file: PlanFile = toml::from_str(text).map_err(FileProblem::from)?;
-    let mut problems = Vec::new();
-    if file.format != FORMAT {
-        problems.push(FileProblem::Format(file.format));
-    }
-    within("prescription_gy", file.prescription_gy, 1e-3, 1e4, &mut problems);
-    let template = template(&file.template, patient, &mut problems);
-    if file.needles.len() > MAX_NEEDLES {
-        problems.push(FileProblem::TooManyNeedles {
-            given: file.needles.len(),
-            most: MAX_NEEDLES,
+    let mut problems: Vec<FileProblem> = file.problems().into_iter().map(FileProblem::from).collect();
+    let needles = (1..).zip(&file.needles).map(|(number, n)| {
+        let hole = n.hole.as_deref().map(str::parse::<Hole>).transpose();
+        let hole = hole.unwrap_or_else(|problem| {
+            problems.push(FileProblem::Hole { number, problem });
+            None
         });
-    }
-    let seeds: usize = file.needles.iter().map(|n| n.seed_along_mm.len()).sum();
-    problems.extend(too_many_seeds(seeds));
-    let needles = file.needles.iter().enumerate().map(|(number, n)| {
-        let mut found = Vec::new();
-        let needle = needle(n, patient, &mut found);
-        problems.extend(found.into_iter().map(|problem| FileProblem::Needle {
-            number: number + 1,
-            problem: Box::new(problem),
-        }));
-        needle.in_order_of_file()
+        needle(n, hole, patient).in_order_of_file()
     });
     let needles = needles.collect();
     ProblemList::check(problems)?;
     Ok(ImplantPlan {
-        template,
+        template: template(&file.template, patient),
         source: file.source,
         prescription_gy: file.prescription_gy,
         needles,
@@ -138,16 +84,7 @@ impl Needle {
     }
 }
 
-fn template(file: &TemplateFile, patient: &PatientFrame, problems: &mut Vec<FileProblem>) -> Template {
-    place("template: middle_hole_mm", file.middle_hole_mm, problems);
-    for (name, axis) in [
-        ("template: columns", file.columns),
-        ("template: rows", file.rows),
-        ("template: inwards", file.inwards),
-    ] {
-        unit(name, axis, problems);
-    }
-    within("template: pitch_mm", file.pitch_mm, 1.0, 20.0, problems);
+fn template(file: &TemplateFile, patient: &PatientFrame) -> Template {
     Template {
         middle_m: patient.scene_from_patient(file.middle_hole_mm.map(|c| c * 1e-3)),
         columns: patient.scene_from_patient_direction(file.columns),
@@ -157,36 +94,13 @@ fn template(file: &TemplateFile, patient: &PatientFrame, problems: &mut Vec<File
     }
 }
 
-fn needle(file: &NeedleFile, patient: &PatientFrame, problems: &mut Vec<FileProblem>) -> Needle {
-    let hole = file.hole.as_deref().map(str::parse::<Hole>).transpose();
-    place("entry_mm", file.entry_mm, problems);
-    unit("direction", file.direction, problems);
-    within("depth_mm", file.depth_mm, 0.0, 500.0, problems);
-    within("retract_to_mm", file.retract_to_mm, 0.0, 500.0, problems);
-    if let Some(spacer) = file.spacer_mm {
-        within("spacer_mm", spacer, 0.1, 50.0, problems);
-    }
-    if file.seed_along_mm.len() != file.strength_u.len() {
-        problems.push(FileProblem::Strengths {
-            places: file.seed_along_mm.len(),
-            strengths: file.strength_u.len(),
-        });
-    }
-    for &along in &file.seed_along_mm {
-        within("seed_along_mm", along, 0.0, 500.0, problems);
-    }
-    for &strength in &file.strength_u {
-        within("strength_u", strength, 0.0, 1e5, problems);
-    }
+fn needle(file: &NeedleFile, hole: Option<Hole>, patient: &PatientFrame) -> Needle {
     let seed = |(along, &strength_u): (&f64, &f64)| NeedleSeed {
         along_m: along * 1e-3,
         strength_u,
     };
     Needle {
-        hole: hole.unwrap_or_else(|why| {
-            problems.push(why.into());
-            None
-        }),
+        hole,
         entry_m: patient.scene_from_patient(file.entry_mm.map(|c| c * 1e-3)),
         direction: patient.scene_from_patient_direction(file.direction),
         depth_m: file.depth_mm * 1e-3,
@@ -196,34 +110,6 @@ fn needle(file: &NeedleFile, patient: &PatientFrame, problems: &mut Vec<FileProb
             .map_or(Loading::Loose, |s| Loading::Stranded { spacer_m: s * 1e-3 }),
         seeds: file.seed_along_mm.iter().zip(&file.strength_u).map(seed).collect(),
     }
-}
-
-fn place(key: &'static str, mm: [f64; 3], problems: &mut Vec<FileProblem>) {
-    // NaN compares false.
-    if !mm.iter().all(|c| c.abs() <= MAX_MM) {
-        problems.push(FileProblem::Place { key, mm });
-    }
-}
-
-fn unit(key: &'static str, axis: [f64; 3], problems: &mut Vec<FileProblem>) {
-    if !(0.999..1.001).contains(&Vector3::from(axis).norm()) {
-        problems.push(FileProblem::Direction { key, axis });
-    }
-}
-
-fn within(key: &'static str, value: f64, least: f64, most: f64, problems: &mut Vec<FileProblem>) {
-    if !(least..=most).contains(&value) {
-        problems.push(FileProblem::Range {
-            key,
-            value,
-            least,
-            most,
-        });
-    }
-}
-
-fn too_many_seeds(given: usize) -> Option<FileProblem> {
-    (given > MAX_SEEDS).then_some(FileProblem::TooManySeeds { given, most: MAX_SEEDS })
 }
 
 /// Reads a plan file; the error names it.
@@ -258,7 +144,7 @@ pub fn import(
     // A plan names holes of its own template, and its needles may be curved.
     let is_table = file.declared.is_none();
     let rows = file.rows;
-    if let Some(problem) = too_many_seeds(rows.len()) {
+    if let Some(problem) = PlanProblem::of_seeds(rows.len()) {
         return Err(PlanError::of_file(path, problem));
     }
     let mut needles: Vec<(Option<u32>, Needle)> = Vec::new();

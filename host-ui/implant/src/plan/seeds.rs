@@ -4,6 +4,7 @@ use super::{PlanError, file};
 use crate::readers::{Declared, SeedDefaults, SeedFile, read_seeds};
 use std::path::Path;
 use stylet_anatomy::PatientFrame;
+use stylet_base::input::has_ending;
 use stylet_dose::Source;
 use stylet_dose::decay::s_to_days;
 pub use stylet_files::report;
@@ -11,7 +12,7 @@ pub use stylet_files::report;
 /// Reads the seeds of a file in the patient's frame; a plan file is recognised by its extension, an
 /// RT Plan by its content.
 pub fn read(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, PlanError> {
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
+    if has_ending(path, "toml") {
         return of_plan_file(path);
     }
     Ok(read_seeds(path, defaults)?)

@@ -206,14 +206,10 @@ fn write(folder: &Path, report: &mut CampaignReport) -> Result<(), CampaignError
             sha256: sha256(&bytes),
         });
     }
-    let text = seal(&text_of(report)?);
+    let text = seal(&disk::json(report)?);
     write_whole(&folder.join(REPORT), text.as_bytes()).map_err(DiskError::from)?;
     println!("{}\n{}", folder.join(PAGE).display(), folder.join(REPORT).display());
     Ok(())
-}
-
-fn text_of(report: &CampaignReport) -> Result<String, DiskError> {
-    Ok(serde_json::to_string_pretty(report)? + "\n")
 }
 
 /// Checks a finished campaign: digests, the chain, every figure, and the signature; returns problems and notes.
@@ -245,7 +241,11 @@ fn again(folder: &Path, text: &str, problems: &mut Vec<String>) -> Result<(), Ca
     })?;
     let mut again = report::report(&plan, &store, said.about.clone())?;
     (again.sha256, again.files) = (said.sha256, said.files);
-    problems.extend(sealed::lines(REPORT, text, &text_of(&again)?).into_iter().take(NAMED));
+    problems.extend(
+        sealed::lines(REPORT, text, &disk::json(&again)?)
+            .into_iter()
+            .take(NAMED),
+    );
     if again.about.commit == COMMIT {
         let page = disk::read_text(&folder.join(PAGE))?;
         problems.extend(sealed::other_text(PAGE, &page, &page::page(&again)?));

@@ -1,6 +1,7 @@
 //! Computes every figure of a report again from its raw data, and names each line that differs.
 
 use super::Checked;
+use crate::disk;
 use crate::files;
 use crate::provenance::COMMIT;
 use crate::raw::Raw;
@@ -53,7 +54,7 @@ fn compare(text: &str, read: impl Fn(&str) -> Option<Vec<u8>>, checked: &mut Che
     );
     let mut again = report.clone();
     derive(&mut again, &raw, &limits);
-    let expected = files::text(&again).map_err(|e| e.to_string())?;
+    let expected = disk::json(&again).map_err(|e| e.to_string())?;
     checked
         .problems
         .extend(sealed::lines(JSON, text, &expected).into_iter().take(NAMED));

@@ -21,34 +21,19 @@ pub enum StampError {
 
 /// Returns the time at which the authority with the certificates `ca` saw `file`, in words.
 pub fn check(file: &Path, ca: &Path) -> Result<String, StampError> {
-    let mut stamp = file.as_os_str().to_owned();
-    stamp.push(".tsr");
-    let stamp = PathBuf::from(stamp);
+    let stamp = file.with_added_extension("tsr");
     for needed in [file, ca, &stamp] {
         disk::read(needed)?;
     }
-    let path = |path: &Path| path.as_os_str().to_owned();
-    let verified = openssl(&[
-        OsStr::new("-verify").into(),
-        OsStr::new("-data").into(),
-        path(file),
-        OsStr::new("-in").into(),
-        path(&stamp),
-        OsStr::new("-CAfile").into(),
-        path(ca),
-    ])?;
+    let files: [&OsStr; 4] = ["-data".as_ref(), file.as_ref(), "-in".as_ref(), stamp.as_ref()];
+    let verified = openssl(&[&["-verify".as_ref()][..], &files[..], &["-CAfile".as_ref(), ca.as_ref()]].concat())?;
     if !verified.status.success() {
         let said = String::from_utf8_lossy(&verified.stderr).into_owned();
         let why = said.lines().find(|l| l.contains("error:")).or(said.lines().next());
         let said = why.unwrap_or("no reason given").to_owned();
         return Err(StampError::Refused { stamp, said });
     }
-    let shown = openssl(&[
-        OsStr::new("-reply").into(),
-        OsStr::new("-in").into(),
-        path(&stamp),
-        OsStr::new("-text").into(),
-    ])?;
+    let shown = openssl(&[&["-reply".as_ref()][..], &files[2..], &["-text".as_ref()]].concat())?;
     let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
     let time = shown.lines().find_map(|l| l.strip_prefix("Time stamp:"));
     Ok(format!(
@@ -57,7 +42,7 @@ pub fn check(file: &Path, ca: &Path) -> Result<String, StampError> {
     ))
 }
 
-fn openssl(words: &[std::ffi::OsString]) -> Result<Output, StampError> {
+fn openssl(words: &[&OsStr]) -> Result<Output, StampError> {
     let run = Command::new("openssl")
         .arg("ts")
         .args(words)

@@ -45,7 +45,7 @@ use stylet_sim::tissue::TissueSpec;
 use stylet_wall::packet::Kind;
 pub(crate) use supervisor::LOOP_ENDED;
 use supervisor::Supervisor;
-pub use wall::{BridgeError, Wall, program};
+pub use wall::{BridgeError, Wall, watcher};
 
 const PASS: Duration = Duration::from_millis(2);
 

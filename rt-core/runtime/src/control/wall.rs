@@ -9,12 +9,11 @@ mod journal;
 mod kept;
 mod outbox;
 
-pub use child::program;
-use child::{Running, SILENT_AFTER};
+pub use child::watcher;
+use child::{Running, SILENT_AFTER, program};
 use journal::Journal;
 use kept::Kept;
 pub use outbox::Outbox;
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::collections::VecDeque;
 use std::os::fd::OwnedFd;
 use std::path::PathBuf;
@@ -140,13 +139,7 @@ impl Wall {
     /// Waits for the bridge, at most `longest`.
     pub fn wait(&self, longest: Duration) {
         match &self.outbox.socket {
-            Some(socket) => {
-                let longest = Timespec::try_from(longest).ok();
-                let _ = poll(
-                    &mut [PollFd::from_borrowed_fd(socket.as_fd(), PollFlags::IN)],
-                    longest.as_ref(),
-                );
-            }
+            Some(socket) => socket.wait(longest),
             None => std::thread::sleep(longest),
         }
     }

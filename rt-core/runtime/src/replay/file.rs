@@ -1,12 +1,12 @@
 //! A flight recording on disk: magic, SHA-256 of the rest, and the recording itself.
 
+use crate::environment::user_folder;
 use crate::pieces;
 use crate::rt::haptic_tape::HapticFlight;
 use crate::rt::second::SecondFlight;
 use crate::rt::tissue_tape::TissueFlight;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use stylet_hw::DeviceInfo;
 use stylet_sim::line::LineSource;
@@ -104,21 +104,8 @@ pub struct SecondFigures {
 impl Flight {
     /// Writes the file atomically.
     pub fn write(&self, path: &Path) -> Result<(), FlightError> {
-        let failed = |e: std::io::Error| FlightError::new(path, Problem::Io(e));
         let body = postcard::to_stdvec(self).map_err(|e| FlightError::new(path, Problem::Encoding(e)))?;
-        let unfinished = path.with_extension("part");
-        let written = std::fs::File::create(&unfinished).and_then(|mut file| {
-            file.write_all(MAGIC)?;
-            file.write_all(&Sha256::digest(&body))?;
-            pieces::write(&mut file, &body)?;
-            file.sync_all()
-        });
-        if let Err(why) = written {
-            // An incomplete file is of no use.
-            let _ = std::fs::remove_file(&unfinished);
-            return Err(failed(why));
-        }
-        std::fs::rename(&unfinished, path).map_err(failed)
+        pieces::write(path, &[MAGIC, &Sha256::digest(&body), &body]).map_err(|e| FlightError::new(path, Problem::Io(e)))
     }
 
     /// Reads a file of [`Flight::write`]; anything else is refused with a reason.
@@ -152,10 +139,7 @@ fn other_format(bytes: &[u8]) -> Problem {
 
 /// Returns the default folder of the recordings: `$XDG_STATE_HOME/stylet/flights`, by default under `~/.local/state`.
 pub fn default_folder() -> PathBuf {
-    let from = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
-    let state = from("XDG_STATE_HOME")
-        .filter(|p| p.is_absolute())
-        .or_else(|| from("HOME").map(|home| home.join(".local/state")));
+    let state = user_folder("XDG_STATE_HOME", ".local/state");
     state.unwrap_or_else(std::env::temp_dir).join("stylet/flights")
 }
 

@@ -1,5 +1,7 @@
 //! `CLOCK_MONOTONIC`, and a sleep until an absolute time on it.
 
+pub use stylet_shm_schema::affinity::now_ns;
+
 /// Period of the force loop: 1 kHz.
 pub const HAPTIC_PERIOD_NS: u64 = 1_000_000;
 /// Period of the tissue loop: 200 Hz.
@@ -16,14 +18,6 @@ pub const SECOND_PHASE: f64 = 0.75;
 /// Converts a phase to nanoseconds.
 pub fn phase_ns(phase: f64, period_ns: u64) -> u64 {
     (phase * period_ns as f64) as u64
-}
-
-/// Nanoseconds of `CLOCK_MONOTONIC`.
-pub fn now_ns() -> u64 {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: `time` is valid for writes; the clock always exists on Linux.
-    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
-    time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
 }
 
 /// Returns at `time_ns` or later; continues to sleep after a signal.

@@ -90,14 +90,5 @@ pub(super) fn add_scaled(a: f64, x: &[f64], y: &mut [f64]) {
 /// Returns the sum of products, in four sums side by side.
 #[inline(always)]
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (a4, b4) = (a.as_chunks::<4>(), b.as_chunks::<4>());
-    for (a, b) in a4.0.iter().zip(b4.0) {
-        for n in 0..4 {
-            sums[n] += a[n] * b[n];
-        }
-    }
-    let whole = 4 * a4.0.len().min(b4.0.len());
-    let rest: f64 = a[whole..].iter().zip(&b[whole..]).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f64>() + rest
+    crate::simd::dot::<4>(a, b)
 }

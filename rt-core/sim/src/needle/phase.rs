@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::settings::{Problem, Problems};
+pub use stylet_settings::Phase;
 
 /// The coefficients of eq. 6, for one membrane and the tissue behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -58,30 +59,6 @@ impl NeedleParameters {
         problems.range("needle.hysteresis_m", self.hysteresis_m, 0.0, 0.01);
         problems.range("needle.hold_speed_m_per_s", self.hold_speed_m_per_s, 0.0, 0.05);
         problems.finish()
-    }
-}
-
-/// Phase of needle and tissue. The numbers are stable: they appear in records.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[repr(u32)]
-pub enum Phase {
-    /// The tip has not met the membrane.
-    #[default]
-    Outside = 0,
-    /// The membrane gives and holds: the tissue follows the tip.
-    Contraction = 1,
-    /// The membrane is punctured and the tip cuts.
-    Penetration = 2,
-    /// The tip comes out.
-    Retraction = 3,
-    /// Needle in the tissue, at rest.
-    Hold = 4,
-}
-
-impl Phase {
-    /// Its number in records.
-    pub const fn code(self) -> u32 {
-        self as u32
     }
 }
 

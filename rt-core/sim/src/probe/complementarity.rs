@@ -231,19 +231,9 @@ fn substitute(factor: &[f64], values: &mut [f64]) {
     }
 }
 
-/// Returns the dot product, in eight sums side by side.
 #[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a8, b8) = (a.as_chunks::<8>(), b.as_chunks::<8>());
-    for (a, b) in a8.0.iter().zip(b8.0) {
-        for n in 0..8 {
-            sums[n] += a[n] * b[n];
-        }
-    }
-    let whole = 8 * a8.0.len().min(b8.0.len());
-    let rest: f64 = a[whole..].iter().zip(&b[whole..]).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f64>() + rest
+    crate::simd::dot::<8>(a, b)
 }
 
 #[cfg(test)]

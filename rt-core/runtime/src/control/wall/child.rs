@@ -1,10 +1,12 @@
 //! The bridge as a process: its program, and whether it is alive.
 
+use std::io;
 use std::os::unix::process::ExitStatusExt;
 use std::path::PathBuf;
-use std::process::Child;
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::Epoch;
+use stylet_shm_schema::{Epoch, Instance};
+use stylet_wall::packet::Socket;
 
 /// Longest silence: the bridge reports twenty times a second.
 pub const SILENT_AFTER: Duration = Duration::from_millis(400);
@@ -78,6 +80,14 @@ impl Running {
         let is_dead = silent >= patience && (silent >= SILENT_WITHOUT_PROCESSOR || !is_starved());
         is_dead.then_some(silent)
     }
+}
+
+/// Starts the bridge's program as a host of a measurement: one that watches (`host`) or that loads the core (`load`).
+pub fn watcher(task: &str, instance: &Instance) -> io::Result<(Socket, Child)> {
+    let (socket, end) = Socket::pair()?;
+    let mut command = Command::new(program());
+    command.args([task, instance.name()]).stdin(end).stdout(Stdio::null());
+    Ok((socket, command.spawn()?))
 }
 
 /// Path of the bridge's program, installed in the folder of this one; a test runs from a folder below.

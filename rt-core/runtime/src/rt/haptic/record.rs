@@ -91,7 +91,7 @@ impl HapticLoop {
         s.worst_lag_ns = s.worst_lag_ns.max(lag_ns);
         s.worst_lag_m = s.worst_lag_m.max(lag_m);
         s.tissue_force_n = along(&t.tissue_n);
-        s.phase = response.phase.code();
+        s.phase = response.phase as u32;
         s.fault = self.memory.hand.watchdog.fault() as u32;
         s.flags = now_flags;
         s.seed_count = tissue.seed_count;

@@ -121,7 +121,7 @@ impl TissueLoop {
             passes: report.passes,
             moved_elements: report.moved,
             held_element: self.state.held.map_or(u32::MAX, |h| h.element),
-            phase: self.state.pose.phase.code(),
+            phase: self.state.pose.phase as u32,
             vertex_count: vertex_count as u32,
             node_count: self.world.scene.nodes.elements.len() as u32,
             bend_count: 0,
