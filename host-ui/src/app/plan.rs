@@ -69,7 +69,7 @@ impl App {
                 self.withdraw_plan("Discard the plan");
             }
             PlanAction::Restore => self.restore_plan(),
-            PlanAction::Add(hole) => planner.add(hole),
+            PlanAction::Add(hole) => planner.add(hole, self.settings.seed_strength_u),
             PlanAction::Remove(needle) => planner.edit(|plan| plan.without_needle(needle)),
             PlanAction::Move(needle, hole) => planner.edit(|plan| plan.with_needle_at(needle, hole)),
             PlanAction::SetRow(needle, row) => planner.set_row(needle, row),

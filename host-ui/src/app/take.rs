@@ -31,8 +31,8 @@ impl App {
         let session_before = self.shown.session.map(|s| s.session_id);
         self.shown.take(&self.link);
         if self.shown.scene.map(|s| s.id()) != scene_before {
-            // The file of another scene's plan is not replaced by this one's.
-            self.workflow.plan.forget_file();
+            // The file of another scene's plan is not replaced by this one's, and its gland lies elsewhere.
+            self.workflow.plan.forget_scene();
             let begins = std::mem::take(&mut self.files.begins_outside);
             if begins && self.shown.has_flag(flags::SIMULATED_DEVICE) {
                 self.files.going_outside = Going::Due;
