@@ -146,7 +146,7 @@ impl App {
         let inwards = Vector3::from(outlines.template.inwards);
         let view = &mut self.middle.view;
         let off_m = (view.cursor_m - Vector3::from(outlines.template.middle_m)).dot(&inwards);
-        view.follow_tip = false;
+        view.leave_tip();
         view.cursor_m += inwards * (depth_m - off_m);
     }
 

@@ -74,6 +74,10 @@ impl App {
         self.take_pictures();
         self.take_debrief();
         self.take_trainees();
+        if std::mem::take(&mut self.middle.view.has_left_tip) {
+            let text = "The slices no longer follow the tip. Press F to follow it again.";
+            self.shown.note = Some(Note::done(text.to_owned()));
+        }
         self.middle.take(&self.shown, self.link.scene(), self.link.snapshot());
     }
 
