@@ -246,7 +246,8 @@ impl App {
 
     /// Says how a run ended, with the planned seeds that are not in the tissue.
     fn end_of_run(&self) -> Note {
-        let needles = self.script.needles.len();
+        let in_plan = self.planner.plan().map_or(0, |plan| plan.needles.len());
+        let needles = if self.script.needles.is_empty() { 0 } else { in_plan };
         let seeds = all_errors(&self.shown);
         let missing = seeds.iter().filter(|(_, seed)| seed.placed.is_none()).count();
         match (needles, missing) {
@@ -265,7 +266,7 @@ impl App {
             let needle = run.needle();
             self.shown.run_step = Some(run.step());
             self.shown.run_waits = Some(run.waiting());
-            self.shown.run_needle = (self.script.needles.len() > 1).then_some((needle, self.script.needles.len()));
+            self.shown.run_needle = self.script.in_plan(needle, self.planner.plan());
             self.follow_run(needle, status == RunStatus::Done);
             self.shown.note = match status {
                 RunStatus::Working => None,
