@@ -32,7 +32,7 @@ pub const KEYS: [(&str, &str); 26] = [
     ("P,  K", "parameters; mark this moment, inject faults"),
     (
         "1 to 5",
-        "look obliquely, from the perineum, the side, above, along the needle",
+        "view: oblique, from the perineum, the side, above, along the needle",
     ),
     ("V,  R", "all views, 3D, slices, the probe, fluoroscopy; reset the view"),
     ("PgUp, PgDn, Home, End", "probe 5 mm in or out, 5° to the left or right"),

@@ -86,6 +86,15 @@ pub fn rate(period_ns: u64) -> String {
     }
 }
 
+/// Formats an estimate of the time left.
+pub fn time_left(seconds: f64) -> String {
+    match (seconds / 60.0).round() as u64 {
+        0 => "less than a minute left".to_owned(),
+        minutes @ 1..60 => format!("about {minutes} min left"),
+        minutes => format!("about {} h {} min left", minutes / 60, minutes % 60),
+    }
+}
+
 /// Formats a count with thin spaces between groups, so that eight digits are legible.
 pub fn count(n: u64) -> String {
     let digits = n.to_string();
@@ -136,6 +145,9 @@ mod tests {
     #[test]
     fn figures_are_formatted_for_people() {
         assert_eq!(length(0.0123), "12.3 mm");
+        let left = [20.0, 45.0, 290.0, 3661.0].map(time_left);
+        let expected = ["less than a minute", "about 1 min", "about 5 min", "about 1 h 1 min"];
+        assert_eq!(left, expected.map(|time| format!("{time} left")));
         assert_eq!(length(-1e-9), "0.0 mm");
         assert_eq!(signed_mm(-0.00125), "-1.25");
         assert_eq!(signed_mm(0.00125), "+1.25");

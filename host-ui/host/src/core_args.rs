@@ -8,7 +8,7 @@ use stylet_shm_schema::Instance;
 /// Options of every command that uses a core.
 #[derive(Args, Clone, Debug, Default)]
 pub struct CoreArgs {
-    /// Name that rt-core was started under
+    /// Name under which rt-core was started
     #[arg(long, default_value = "main", value_parser = Instance::new)]
     pub instance: Instance,
     /// What to run instead of rt-core's scene: paper, pelvis or full, which are built in, or a volume: NIfTI-1, NRRD,

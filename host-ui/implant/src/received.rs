@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use stylet_dose::Seed;
 use stylet_host::link::Link;
 use stylet_host::moments::{Moment, Moments};
-use stylet_shm_schema::{HapticState, PlanInForce, Prescribed, SceneHeader, SeedPose, TickRecord};
+use stylet_shm_schema::{HapticState, PlanInForce, Prescribed, SceneHeader, SeedPose, TickRecord, flags};
 
 /// Largest distance, m, from a needle's axis at which a seed dropped before this host listened
 /// belongs to it.
@@ -33,6 +33,8 @@ pub struct ReceivedProcedure {
     /// Generation of the plan that was checked last.
     generation: Option<(u64, u64)>,
     seeds: Vec<SeedPose>,
+    /// True once a snapshot came.
+    has_begun: bool,
 }
 
 /// Planned seed and the one that was dropped for it, by its index among those in the tissue.
@@ -65,6 +67,15 @@ impl ReceivedProcedure {
             self.seeds.clear();
             self.seeds.extend_from_slice(seeds);
             self.take_plan(link.plan(), link.state());
+            self.begin(link.state());
+        }
+    }
+
+    /// Notes whether the procedure had begun before this host listened.
+    fn begin(&mut self, state: Option<&HapticState>) {
+        if !std::mem::replace(&mut self.has_begun, true) {
+            let is_in_contact = state.is_some_and(|s| s.flags & flags::IN_CONTACT != 0);
+            self.trace.is_from_middle = is_in_contact || !self.seeds.is_empty();
         }
     }
 

@@ -182,7 +182,7 @@ impl App {
             Action::Redo if self.draws() => self.planner.draw(Edit::Redo),
             Action::Undo if self.edits_plan() => self.planner.undo(),
             Action::Redo if self.edits_plan() => self.planner.redo(),
-            Action::Redo => self.refuse("Only a change of the plan can be redone, while its step is open."),
+            Action::Redo => self.refuse("Only changes of the plan can be redone, while step 2 is open."),
             Action::Undo => match undo_action(&self.shown) {
                 Some(Undo::Seed) => self.send("Undo seed", &Request::UndoSeed),
                 Some(Undo::Reset) => self.send("Undo reset", &Request::UndoSeed),

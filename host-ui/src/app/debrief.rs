@@ -133,7 +133,7 @@ impl App {
         let saved = match job.poll() {
             JobUpdate::Pending => return,
             JobUpdate::Message(saved) => saved,
-            JobUpdate::Ended => Err("the debrief was not written: its thread ended before it replied".into()),
+            JobUpdate::Ended => Err("The debrief was not written: its thread ended before it replied.".into()),
         };
         self.debrief = None;
         self.shown.note = Some(match saved {
@@ -149,7 +149,15 @@ impl App {
         };
         (delivered.source, delivered.prescription_gy) = source_of(&implant.plan.source, implant.plan.prescription_gy)?;
         delivered.title = format!("Scene {}", delivered.scene.header.name.read());
-        (delivered.pairs, delivered.lost) = (Vec::new(), Vec::new());
+        (delivered.pairs, delivered.lost, delivered.unplanned) = self.pairs(implant);
+        (delivered.updates, delivered.plan) = (self.planner.reviewed().to_vec(), Some(implant.plan.clone()));
+        Ok(delivered)
+    }
+
+    /// Returns the seeds in the tissue, each with its planned one; those planned without one, also of the needles to
+    /// come; those without a plan.
+    fn pairs(&self, implant: &planner::Implant) -> (Vec<SeedPair>, Vec<Seed>, Vec<Seed>) {
+        let (mut pairs, mut lost) = (Vec::new(), Vec::new());
         let seeds = &self.shown.seeds;
         let mut has_plan = vec![false; seeds.len()];
         for (needle, row) in all_errors(&self.shown) {
@@ -159,16 +167,17 @@ impl App {
             match placed {
                 Some(n) => {
                     has_plan[n] = true;
-                    delivered.pairs.push(SeedPair::new((needle, hole), planned, &seeds[n]));
+                    pairs.push(SeedPair::new((needle, hole), planned, &seeds[n]));
                 }
-                None => delivered.lost.push(planned),
+                None => lost.push(planned),
             }
         }
+        let to_come = implant.plan.needles.iter().skip(self.shown.planning.progress.begun());
+        lost.extend(to_come.flat_map(|needle| needle.dose_seeds()));
         let (strength_u, others) = (self.planned_as().strength_u, seeds.iter().zip(has_plan));
         let others = others.filter(|(_, has_plan)| !has_plan);
-        delivered.unplanned = others.map(|(pose, _)| seed_of(pose, strength_u)).collect();
-        (delivered.updates, delivered.plan) = (self.planner.reviewed().to_vec(), Some(implant.plan.clone()));
-        Ok(delivered)
+        let unplanned = others.map(|(pose, _)| seed_of(pose, strength_u)).collect();
+        (pairs, lost, unplanned)
     }
 
     /// Returns the hole of a planned seed, the seed, and the number of the one that was dropped for
@@ -205,12 +214,16 @@ impl Delivered {
         planned: Prescribed,
         trainee: Option<&str>,
     ) -> Result<Self, Failure> {
-        let scene = link.scene().ok_or("there is no scene yet")?.clone();
+        let scene = link.scene().ok_or("There is no scene yet.")?.clone();
         let (source, prescription_gy) = source_of(&planned.source.read(), planned.dose_gy)?;
         let (pairs, lost, unplanned) = heard.pairs(planned.strength_u);
         let mut title = format!("Scene {}", scene.header.name.read());
         if let Some(name) = trainee {
             title = format!("{title}, {name}");
+        }
+        let of = heard.prescribed().filter(|of| of.needle < of.last_needle);
+        if let Some(of) = of {
+            title = format!("{title}, up to needle {} of {}", of.needle, of.last_needle);
         }
         if heard.seeds_before() > 0 {
             title = format!("{title}, without the first {} seeds", heard.seeds_before());
@@ -268,4 +281,21 @@ fn write(delivered: &Delivered, folder: PathBuf) -> Result<PathBuf, Failure> {
     std::fs::create_dir_all(&folder).map_err(|e| format!("{} cannot be created ({e})", folder.display()))?;
     score::write(&score, delivered.made()?, &folder)?;
     Ok(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::app::tests::fixture::{Drawn, many_needles, one_needle};
+
+    /// Guards against a "planned" D90 of the needles that were begun, beside limits of the whole implant.
+    #[test]
+    fn the_planned_dose_is_that_of_the_whole_plan() {
+        let mut drawn = Drawn::new([1280.0, 720.0], 1.0);
+        drawn.app.shown = many_needles(5, 1);
+        drawn.app.shown.seeds = one_needle(0.0, 3).seeds;
+        let implant = drawn.app.shown.planning.implant.clone().expect("a plan");
+        let (pairs, lost, unplanned) = drawn.app.pairs(&implant);
+        assert_eq!(pairs.len() + lost.len(), implant.plan.seed_count());
+        assert_eq!((pairs.len(), unplanned.len()), (2, 1));
+    }
 }

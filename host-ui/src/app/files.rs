@@ -3,13 +3,14 @@
 use super::App;
 use crate::action::{Action, PlanAction, StructuresAction, WatchAction};
 use crate::dialog::Purpose;
+use crate::loader::Loaded;
 use crate::panel::structures::StructureTable;
 use crate::panel::workflow::Progress;
 use crate::recent;
 use crate::shown::LoadState;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use stylet_files::{Image, Voxels};
+use stylet_files::{Image, LabelVolume, Tissue, Voxels};
 use stylet_host::core_args::SceneChoice;
 use stylet_shm_schema::{SceneHeader, SceneId};
 
@@ -44,13 +45,32 @@ pub(super) enum Going {
 }
 
 /// File that this window reads and sends as a scene.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct SentScene {
     pub path: PathBuf,
     /// Name of the scene, once it is read.
     pub name: String,
     /// Scene that the core had when this one was sent.
     pub after: Option<SceneId>,
+    /// Its structures, if a person named them in the window.
+    pub structures: Vec<Tissue>,
+}
+
+impl SceneFiles {
+    /// Gives the file to come the structures of the last scene, if it is the same file: another core gets it again.
+    fn name_as_before(&mut self) {
+        if let (Some(to_come), Some(before)) = (&mut self.scene_to_come, &self.scene_file)
+            && to_come.path == before.path
+        {
+            to_come.structures.clone_from(&before.structures);
+        }
+    }
+
+    /// Returns the file to come with its structures, if they were named before.
+    fn known_structures(&self) -> Option<(PathBuf, Vec<Tissue>)> {
+        let file = self.scene_to_come.as_ref().filter(|file| !file.structures.is_empty())?;
+        Some((file.path.clone(), file.structures.clone()))
+    }
 }
 
 impl SentScene {
@@ -119,14 +139,13 @@ impl App {
         };
         match action {
             StructuresAction::Use => {
+                let (voxels, image, structures) = (table.voxels.clone(), table.image.clone(), table.structures());
                 self.files.scene_to_come = Some(SentScene {
                     path: table.path.clone(),
-                    name: String::new(),
-                    after: None,
+                    structures: structures.clone(),
+                    ..SentScene::default()
                 });
-                let (voxels, image) = (table.voxels.clone(), table.image.clone());
-                self.loader
-                    .begin_structures(&table.path, voxels, table.structures(), image);
+                self.loader.begin_structures(&table.path, voxels, structures, image);
             }
             StructuresAction::Save => {
                 if let Some(path) = table.save() {
@@ -163,6 +182,117 @@ impl App {
     }
 }
 
+impl App {
+    /// Takes the file that was read, or reads the one from the command line.
+    pub(super) fn take_scene_file(&mut self) {
+        if self.shown.is_live()
+            && let Some(scene) = self.files.first_scene.take()
+        {
+            match scene {
+                SceneChoice::File(path) => {
+                    let image = self.files.first_image.take();
+                    self.load(&path, image);
+                    self.files.name_as_before();
+                }
+                SceneChoice::BuiltIn(number) => self.load_builtin(number),
+            }
+        }
+        match self.loader.poll() {
+            None => {}
+            Some(Err(why)) => self.shown.load = LoadState::Refused(why.to_string()),
+            Some(Ok(Loaded::Scene(volume, image))) => {
+                self.files.image_to_come = image.map(|image| (image, volume.name.clone()));
+                if let Some(file) = &mut self.files.scene_to_come {
+                    file.name.clone_from(&volume.name);
+                    file.after = self.link.scene().map(|scene| scene.header.id());
+                }
+                self.upload(&volume);
+            }
+            Some(Ok(Loaded::Image(image))) => self.take_image(image),
+            Some(Ok(Loaded::Labels(voxels, image))) => match self.files.known_structures() {
+                Some((path, structures)) => self.loader.begin_structures(&path, voxels, structures, image),
+                None => self.name_structures(voxels, image),
+            },
+        }
+        if let Some((what, share)) = self.loader.at() {
+            self.shown.load = LoadState::Reading(what, share);
+        }
+    }
+
+    pub(super) fn load(&mut self, path: &Path, image: Option<PathBuf>) {
+        if !self.shown.load.is_busy() {
+            recent::remember(&mut self.settings.recent, absolute(path), false);
+            self.files.scene_to_come = Some(SentScene {
+                path: path.to_owned(),
+                ..SentScene::default()
+            });
+            self.loader.begin_scene(path, self.files.label, image);
+        }
+    }
+
+    pub(super) fn load_image(&mut self, path: &Path) {
+        if !self.shown.load.is_busy() {
+            recent::remember(&mut self.settings.recent, absolute(path), true);
+            self.loader.begin_image(path, self.scene_file());
+        }
+    }
+
+    /// Takes an image of the present scene's patient.
+    fn take_image(&mut self, image: Image) {
+        let Some(scene) = &self.shown.scene else {
+            self.shown.load = LoadState::Refused(format!("{}: its scene is no longer loaded", image.name));
+            return;
+        };
+        let [low, high] = [scene.target_lower_m, scene.target_upper_m];
+        let middle_m = [0, 1, 2].map(|a| (low[a] + high[a]) / 2.0);
+        match image.covers(&scene.patient(), middle_m) {
+            Ok(()) => {
+                let name = scene.name.read();
+                self.show_image(image, &name);
+            }
+            Err(why) => self.shown.load = LoadState::Refused(format!("{}: {why}", image.name)),
+        }
+    }
+
+    pub(super) fn show_image(&mut self, image: Image, scene: &str) {
+        let mut text = format!(
+            "{} is shown in the slices, black at {}, white at {}",
+            image.name, image.range[0], image.range[1]
+        );
+        if let Some(warning) = &image.frame.warning {
+            text = format!("{text} ({warning})");
+        }
+        self.shown.load = match self.middle.show_image(image, scene) {
+            Ok(()) => LoadState::Loaded(text),
+            Err(why) => LoadState::Refused(why.to_string()),
+        };
+    }
+
+    fn upload(&mut self, volume: &LabelVolume) {
+        let mut name = volume.name.clone();
+        for warning in &volume.warnings {
+            name = format!("{name} ({warning})");
+        }
+        self.shown.load = match self.link.upload(volume) {
+            Err(e) => LoadState::Refused(e.to_string()),
+            Ok(id) => {
+                let text = format!("sending {}", volume.name);
+                self.files.uploading = Some((id, name));
+                self.files.begins_outside = true;
+                LoadState::Sending(text)
+            }
+        };
+    }
+}
+
+/// Returns the path in absolute form.
+fn absolute(path: &Path) -> String {
+    std::path::absolute(path)
+        .unwrap_or_else(|_| path.to_owned())
+        .display()
+        .to_string()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -185,6 +315,7 @@ mod tests {
                 session_id: 7,
                 generation: 2,
             }),
+            ..SentScene::default()
         };
         assert!(own.is(&scene));
         scene.generation = 4;

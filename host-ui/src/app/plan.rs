@@ -10,7 +10,7 @@ use crate::settings::Layout;
 use nalgebra::Vector3;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use stylet_implant::plan::exchange;
+use stylet_implant::plan::{ImplantPlan, exchange};
 use stylet_implant::workflow::{NeedleTask, Placed, Run, default_plan};
 use stylet_shm_schema::{PlannedNeedle, Prescribed, Request, Text};
 
@@ -28,6 +28,14 @@ pub(super) struct Script {
     pub lost: (Vec<NeedleTask>, Vec<usize>),
 }
 
+impl Script {
+    /// Returns number and count of needles as the plan counts them, also those without seeds; `None` for one needle.
+    pub fn in_plan(&self, at: usize, plan: Option<&ImplantPlan>) -> Option<(usize, usize)> {
+        let (number, plan) = (self.needles.get(at)?, plan?);
+        (self.needles.len() > 1).then_some((*number, plan.needles.len()))
+    }
+}
+
 impl App {
     /// Returns whether undo acts on the plan, which it does while the plan is edited.
     pub(super) fn edits_plan(&self) -> bool {
@@ -40,7 +48,9 @@ impl App {
     }
 
     pub(super) fn take_plan(&mut self) {
-        self.planner.take(self.link.scene(), self.shown.seeds.len());
+        // Before the first snapshot nothing tells that seeds were removed.
+        let seeds = self.link.snapshot().map_or(usize::MAX, |_| self.shown.seeds.len());
+        self.planner.take(self.link.scene(), seeds);
         if let (true, Some(scene), Some(snapshot)) = (self.draws(), self.link.scene(), self.link.snapshot()) {
             self.planner.take_review(scene, snapshot);
         }
@@ -69,7 +79,7 @@ impl App {
                 self.withdraw_plan("Discard the plan");
             }
             PlanAction::Restore => self.restore_plan(),
-            PlanAction::Add(hole) => planner.add(hole),
+            PlanAction::Add(hole) => planner.add(hole, self.settings.seed_strength_u),
             PlanAction::Remove(needle) => planner.edit(|plan| plan.without_needle(needle)),
             PlanAction::Move(needle, hole) => planner.edit(|plan| plan.with_needle_at(needle, hole)),
             PlanAction::SetRow(needle, row) => planner.set_row(needle, row),
@@ -146,7 +156,7 @@ impl App {
         let inwards = Vector3::from(outlines.template.inwards);
         let view = &mut self.middle.view;
         let off_m = (view.cursor_m - Vector3::from(outlines.template.middle_m)).dot(&inwards);
-        view.follow_tip = false;
+        view.leave_tip();
         view.cursor_m += inwards * (depth_m - off_m);
     }
 
@@ -167,21 +177,27 @@ impl App {
             self.placed_found = Instant::now();
             let (numbers, tasks): (Vec<usize>, Vec<NeedleTask>) = self.planner.tasks().into_iter().unzip();
             let placed = self.placed(&tasks);
-            self.shown.continues_at = placed.is_partial().then(|| (placed.next_needle(), tasks.len()));
-            // A reopened window knows of no needle.
-            if placed.is_partial() && self.planner.progress().begun() == 0 {
+            let next = numbers.get(placed.next_needle()).filter(|_| placed.is_partial());
+            let count = self.planner.plan().map_or(0, |plan| plan.needles.len());
+            self.shown.continues_at = next.map(|number| (*number, count));
+            // Seeds that undoing a reset restored, or those of a plan that was imported again.
+            if placed.has_begun() && self.planner.progress().begun() == 0 {
                 self.mark_placed(&numbers, &placed);
             }
         }
     }
 
-    /// Marks the needles before the next one as done.
+    /// Marks the needles before the next one as done, and the next one as inserted if it has begun.
     fn mark_placed(&mut self, numbers: &[usize], placed: &Placed) {
         let mut before = 0;
         for (at, &number) in numbers.iter().enumerate().take(placed.next_needle()) {
             self.planner.begin_needle(number, before);
             before += placed.seeds_of(at);
             self.planner.finish_needle(before);
+        }
+        let next = placed.next_needle();
+        if let Some(&number) = numbers.get(next).filter(|_| placed.is_begun(next)) {
+            self.planner.begin_needle(number, before);
         }
     }
 

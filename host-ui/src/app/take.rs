@@ -3,18 +3,13 @@
 
 use super::App;
 use super::drive::Drive;
-use super::files::{Going, SentScene};
+use super::files::Going;
 use crate::action::Action;
 use crate::dose_worker::DoseRequest;
-use crate::loader::Loaded;
 use crate::panel::workflow::SCRIPTED_STEPS;
-use crate::recent;
 use crate::shown::{LoadState, Note, all_errors};
-use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stylet_controllers::Button;
-use stylet_files::{Image, LabelVolume};
-use stylet_host::core_args::SceneChoice;
 use stylet_implant::plan::Template;
 use stylet_implant::workflow::{RunStatus, move_request};
 use stylet_shm_schema::{Prescribed, Request, flags};
@@ -36,8 +31,8 @@ impl App {
         let session_before = self.shown.session.map(|s| s.session_id);
         self.shown.take(&self.link);
         if self.shown.scene.map(|s| s.id()) != scene_before {
-            // The file of another scene's plan is not replaced by this one's.
-            self.workflow.plan.forget_file();
+            // The file of another scene's plan is not replaced by this one's, and its gland lies elsewhere.
+            self.workflow.plan.forget_scene();
             let begins = std::mem::take(&mut self.files.begins_outside);
             if begins && self.shown.has_flag(flags::SIMULATED_DEVICE) {
                 self.files.going_outside = Going::Due;
@@ -79,6 +74,10 @@ impl App {
         self.take_pictures();
         self.take_debrief();
         self.take_trainees();
+        if std::mem::take(&mut self.middle.view.has_left_tip) {
+            let text = "The slices no longer follow the tip. Press F to follow it again.";
+            self.shown.note = Some(Note::done(text.to_owned()));
+        }
         self.middle.take(&self.shown, self.link.scene(), self.link.snapshot());
     }
 
@@ -245,109 +244,10 @@ impl App {
         }
     }
 
-    fn take_scene_file(&mut self) {
-        if self.shown.is_live()
-            && let Some(scene) = self.files.first_scene.take()
-        {
-            match scene {
-                SceneChoice::File(path) => {
-                    let image = self.files.first_image.take();
-                    self.load(&path, image);
-                }
-                SceneChoice::BuiltIn(number) => self.load_builtin(number),
-            }
-        }
-        match self.loader.poll() {
-            None => {}
-            Some(Err(why)) => self.shown.load = LoadState::Refused(why.to_string()),
-            Some(Ok(Loaded::Scene(volume, image))) => {
-                self.files.image_to_come = image.map(|image| (image, volume.name.clone()));
-                if let Some(file) = &mut self.files.scene_to_come {
-                    file.name.clone_from(&volume.name);
-                    file.after = self.link.scene().map(|scene| scene.header.id());
-                }
-                self.upload(&volume);
-            }
-            Some(Ok(Loaded::Image(image))) => self.take_image(image),
-            Some(Ok(Loaded::Labels(voxels, image))) => self.name_structures(voxels, image),
-        }
-        if let Some((what, share)) = self.loader.at() {
-            self.shown.load = LoadState::Reading(what, share);
-        }
-    }
-
-    pub(super) fn load(&mut self, path: &Path, image: Option<PathBuf>) {
-        if !self.shown.load.is_busy() {
-            recent::remember(&mut self.settings.recent, absolute(path), false);
-            self.files.scene_to_come = Some(SentScene {
-                path: path.to_owned(),
-                name: String::new(),
-                after: None,
-            });
-            self.loader.begin_scene(path, self.files.label, image);
-        }
-    }
-
-    pub(super) fn load_image(&mut self, path: &Path) {
-        if !self.shown.load.is_busy() {
-            recent::remember(&mut self.settings.recent, absolute(path), true);
-            self.loader.begin_image(path, self.scene_file());
-        }
-    }
-
-    /// Takes an image of the present scene's patient.
-    fn take_image(&mut self, image: Image) {
-        let Some(scene) = &self.shown.scene else {
-            self.shown.load = LoadState::Refused(format!(
-                "{}: the scene that it belongs to is no longer loaded",
-                image.name
-            ));
-            return;
-        };
-        let [low, high] = [scene.target_lower_m, scene.target_upper_m];
-        let middle_m = [0, 1, 2].map(|a| (low[a] + high[a]) / 2.0);
-        match image.covers(&scene.patient(), middle_m) {
-            Ok(()) => {
-                let name = scene.name.read();
-                self.show_image(image, &name);
-            }
-            Err(why) => self.shown.load = LoadState::Refused(format!("{}: {why}", image.name)),
-        }
-    }
-
-    fn show_image(&mut self, image: Image, scene: &str) {
-        let mut text = format!(
-            "{} is shown in the slices, black at {}, white at {}",
-            image.name, image.range[0], image.range[1]
-        );
-        if let Some(warning) = &image.frame.warning {
-            text = format!("{text} ({warning})");
-        }
-        self.shown.load = match self.middle.show_image(image, scene) {
-            Ok(()) => LoadState::Loaded(text),
-            Err(why) => LoadState::Refused(why.to_string()),
-        };
-    }
-
-    fn upload(&mut self, volume: &LabelVolume) {
-        let mut name = volume.name.clone();
-        for warning in &volume.warnings {
-            name = format!("{name} ({warning})");
-        }
-        self.shown.load = match self.link.upload(volume) {
-            Err(e) => LoadState::Refused(e.to_string()),
-            Ok(id) => {
-                let text = format!("sending {}", volume.name);
-                self.files.uploading = Some((id, name));
-                self.files.begins_outside = true;
-                LoadState::Sending(text)
-            }
-        };
-    }
-
     /// Says how a run ended, with the planned seeds that are not in the tissue.
     fn end_of_run(&self) -> Note {
-        let needles = self.script.needles.len();
+        let in_plan = self.planner.plan().map_or(0, |plan| plan.needles.len());
+        let needles = if self.script.needles.is_empty() { 0 } else { in_plan };
         let seeds = all_errors(&self.shown);
         let missing = seeds.iter().filter(|(_, seed)| seed.placed.is_none()).count();
         match (needles, missing) {
@@ -366,7 +266,7 @@ impl App {
             let needle = run.needle();
             self.shown.run_step = Some(run.step());
             self.shown.run_waits = Some(run.waiting());
-            self.shown.run_needle = (self.script.needles.len() > 1).then_some((needle, self.script.needles.len()));
+            self.shown.run_needle = self.script.in_plan(needle, self.planner.plan());
             self.follow_run(needle, status == RunStatus::Done);
             self.shown.note = match status {
                 RunStatus::Working => None,
@@ -389,12 +289,4 @@ fn asked_by(button: Button) -> Action {
         Button::Stop => Action::StopRun,
         Button::Engage => Action::Send(Request::Engage),
     }
-}
-
-/// Returns the path in absolute form.
-fn absolute(path: &Path) -> String {
-    std::path::absolute(path)
-        .unwrap_or_else(|_| path.to_owned())
-        .display()
-        .to_string()
 }

@@ -186,7 +186,7 @@ impl App {
             return;
         }
         if self.run.is_some() || self.watches() {
-            self.refuse("Stop the needles or close the recording first, then follow another.");
+            self.refuse("Stop the needles or close the recording before you follow another trainee.");
             return;
         }
         self.trainees.followed = Some(number);

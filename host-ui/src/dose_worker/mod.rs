@@ -204,7 +204,7 @@ impl DoseWorker {
 
     /// Returns the reason why there is no dose, if there is none.
     pub fn trouble(&self) -> Option<&'static str> {
-        self.lost.then_some("the dose is not computed: its thread has ended")
+        self.lost.then_some("The dose is not computed: its thread has ended.")
     }
 
     /// Takes a finished result, and requests a new one if seeds were added, removed or moved. Never

@@ -157,9 +157,9 @@ fn of_line(line: &Relayed) -> Banner {
         return Banner::new(BannerLevel::Bad, "No data from the relay", text);
     }
     let operator = match (line.operates, line.operator.read()) {
-        (1, _) => "You operate".to_owned(),
-        (_, nobody) if nobody.is_empty() => "Nobody operates".to_owned(),
-        (_, other) => format!("{} operates", capital(&other)),
+        (1, _) => "You are operating".to_owned(),
+        (_, nobody) if nobody.is_empty() => "No one is operating".to_owned(),
+        (_, other) => format!("{} is operating", capital(&other)),
     };
     let text = format!(
         "{name}, {}, at {server}. {operator}. Shown {:.0} ms late, round trip {:.0} ms; {} records and {} snapshots lost.",
@@ -245,7 +245,7 @@ fn absent(shown: &Shown, why: &str) -> Banner {
     };
     let mut text = what_ended(shown) + &sentence(said.trim_end_matches('.'));
     if can_start && shown.session.is_none() {
-        text += " Step 1 has a recorded example, which needs none.";
+        text += " Step 1 has a recorded example that needs no core.";
     }
     let banner = Banner::new(BannerLevel::Bad, "The simulator core is not running", text);
     match shown.session {

@@ -73,9 +73,9 @@ fn members(class: &Class) -> String {
 
 fn operates(shown: &Shown, class: &Class) -> String {
     match (hand(shown, class), class.operator.read()) {
-        (Hand::Held, _) => "You operate.".to_owned(),
-        (_, name) if name.is_empty() => "Nobody operates.".to_owned(),
-        (_, name) => format!("{name} operates."),
+        (Hand::Held, _) => "You are operating.".to_owned(),
+        (_, name) if name.is_empty() => "No one is operating.".to_owned(),
+        (_, name) => format!("{name} is operating."),
     }
 }
 

@@ -63,7 +63,7 @@ fn controllers_ui(ui: &mut egui::Ui, shown: &Shown) {
     for words in [
         "Devices may be plugged in at any time.",
         "The one that was moved last controls the needle.",
-        "It must be released once before the needle follows it.",
+        "Release it once before it can move the needle.",
         "With a simulated --device-2, another one controls the probe.",
     ] {
         ui.label(theme::small(words));

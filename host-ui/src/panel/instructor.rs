@@ -128,7 +128,7 @@ fn exercises_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut InstructorState) -
     ui.label(theme::strong("Inject a fault as an exercise"));
     ui.horizontal(|ui| {
         begin(ui, "Lose the device", Exercise::DeviceLost);
-        ui.label(theme::small("the force goes off until Re-arm"));
+        ui.label(theme::small("the force stays off until it is re-armed"));
     });
     ui.horizontal(|ui| {
         begin(ui, "Stiffen the tissue", Exercise::StiffTissue { factor: state.factor });
@@ -168,7 +168,7 @@ fn moments_ui(ui: &mut egui::Ui, moments: &Moments) {
         ui.add(egui::Label::new(theme::small(&line)).wrap());
     }
     if none {
-        ui.label(theme::small("none in this run of rt-core"));
+        ui.label(theme::small("none since rt-core started"));
     }
 }
 

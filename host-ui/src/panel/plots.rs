@@ -20,6 +20,8 @@ const TITLE: f32 = 20.0;
 const PLOT_HEIGHTS: [f32; 2] = [48.0, 190.0];
 /// Height of a line on unseen ticks.
 const SEEN_LINE: f32 = 20.0;
+/// Height of the legend of the marks.
+const MARKS_LINE: f32 = 18.0;
 /// Height of the line of the second device.
 const SECOND_LINE: f32 = 16.0;
 
@@ -35,6 +37,7 @@ pub fn plots_ui(
 ) {
     let marks = marks(ui, moments, |time_ns| history.before_s(time_ns));
     let whole = whole.filter(|trace| !trace.is_empty());
+    let marked = kinds_of_marks(moments, history, whole);
     let lines = usize::from(!history.timing.seen.is_all())
         + usize::from(whole.is_some_and(|trace| !trace.motion().seen.is_all()));
     let second = if shown.second_hand().is_some() {
@@ -43,7 +46,8 @@ pub fn plots_ui(
         0.0
     };
     let plots = Quantity::ALL.len() as f32;
-    let free = height - UNDER_PLOTS - plots * TITLE - second - lines as f32 * SEEN_LINE;
+    let legend = if marked.is_empty() { 0.0 } else { MARKS_LINE };
+    let free = height - UNDER_PLOTS - plots * TITLE - second - legend - lines as f32 * SEEN_LINE;
     let each = (free / plots).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
     let recent = |ui: &mut egui::Ui, name, color, unit, least, quantity| {
         Strip {
@@ -61,6 +65,7 @@ pub fn plots_ui(
     };
     let tokens = theme::of(ui);
     tension_ui(ui, shown);
+    marks_ui(ui, &marked);
     let now = |value: Option<String>| value.unwrap_or_else(|| "n/a".to_owned());
     match whole {
         Some(trace) => whole_ui(ui, trace, moments, each),
@@ -97,18 +102,44 @@ pub fn plots_ui(
     setup::setup_ui(ui, shown);
 }
 
-/// Returns the marks inside the range of a plot.
-fn marks(ui: &egui::Ui, moments: &Moments, at_s: impl Fn(u64) -> Option<f64>) -> Vec<(f64, Color32, String)> {
+fn color_of(ui: &egui::Ui, kind: MomentKind) -> Color32 {
     let tokens = theme::of(ui);
-    let color = |kind: MomentKind| match kind {
+    match kind {
         MomentKind::Mark => tokens.accent,
         MomentKind::Exercise => tokens.warn,
         MomentKind::Fault => tokens.bad,
-    };
+    }
+}
+
+/// Returns the kinds of marks in the plots.
+fn kinds_of_marks(moments: &Moments, history: &History, whole: Option<&Trace>) -> Vec<MomentKind> {
+    let began_ns = whole.and_then(Trace::began_ns).unwrap_or(u64::MAX);
+    let is_plotted = |m: &&Moment| m.time_ns >= began_ns || history.before_s(m.time_ns).is_some();
+    let plotted: Vec<MomentKind> = moments.all().filter(is_plotted).map(|m| m.kind).collect();
+    let all = [MomentKind::Mark, MomentKind::Exercise, MomentKind::Fault];
+    all.into_iter().filter(|kind| plotted.contains(kind)).collect()
+}
+
+/// Names the vertical lines in the plots by their colours.
+fn marks_ui(ui: &mut egui::Ui, kinds: &[MomentKind]) {
+    if kinds.is_empty() {
+        return;
+    }
+    ui.horizontal(|ui| {
+        ui.label(theme::small("Lines in the plots:"));
+        for kind in kinds {
+            let text = RichText::new(kind.name()).small().color(color_of(ui, *kind));
+            ui.label(text);
+        }
+    });
+}
+
+/// Returns the marks inside the range of a plot.
+fn marks(ui: &egui::Ui, moments: &Moments, at_s: impl Fn(u64) -> Option<f64>) -> Vec<(f64, Color32, String)> {
     let shown = |m: &Moment| {
         Some((
             at_s(m.time_ns)?,
-            color(m.kind),
+            color_of(ui, m.kind),
             format!("{}: {}", m.kind.name(), m.text),
         ))
     };
@@ -138,7 +169,11 @@ fn whole_ui(ui: &mut egui::Ui, trace: &Trace, moments: &Moments, height: f32) {
         .show(ui);
     };
     let peak = format!("peak {}", format::force(motion.peak_force_n));
-    title(ui, "Whole procedure: force, N", &peak, tokens.force).explained("force on the hand");
+    let of = match motion.is_from_middle {
+        true => "Since this window opened",
+        false => "Whole procedure",
+    };
+    title(ui, &format!("{of}: force, N"), &peak, tokens.force).explained("force on the hand");
     whole(ui, "whole force", tokens.force, ("N", 2), trace.force_n());
     let peak = format!("peak inwards {}", format::speed(motion.peak_insertion_m_per_s));
     title(ui, "Speed, mm/s", &peak, tokens.depth).explained("speed");
@@ -256,4 +291,36 @@ fn percentile_row(ui: &mut egui::Ui, name: &str, p: &Percentiles) {
         }
     }
     ui.end_row();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+    use stylet_shm_schema::{Event, EventKind, TickRecord};
+
+    /// Guards against orange lines that nothing named.
+    #[test]
+    fn lines_in_the_plots_are_named_while_they_are_in_them() {
+        let mut history = History::default();
+        let mut record = TickRecord::zeroed();
+        record.due_ns = 100_000_000_000;
+        history.take(&[record], [0.0, 0.0, 1.0]);
+        let event = |sequence, kind: EventKind, time_ns| Event {
+            sequence,
+            time_ns,
+            kind: kind as u32,
+            ..Event::zeroed()
+        };
+        let mut moments = Moments::default();
+        moments.take(&[
+            event(1, EventKind::ExerciseBegun, 1_000),
+            event(2, EventKind::FaultRaised, record.due_ns - 1_000),
+            event(3, EventKind::Mark, record.due_ns),
+        ]);
+        assert_eq!(
+            kinds_of_marks(&moments, &history, None),
+            [MomentKind::Mark, MomentKind::Fault]
+        );
+    }
 }

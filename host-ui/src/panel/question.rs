@@ -88,7 +88,7 @@ pub fn question_ui(ctx: &egui::Context, shown: &Shown, question: Option<&Questio
         Question::Replace(path) => (
             "Replace the file?".to_owned(),
             format!(
-                "{} exists, and was not saved from this plan's scene.",
+                "{} already exists, and this plan was not saved there before.",
                 printable(&path.display().to_string())
             ),
             "Replace (Y)".to_owned(),

@@ -76,7 +76,7 @@ fn head_ui(ui: &mut egui::Ui, tool: &mut Option<Tool>, review: &ReviewShown, act
 fn contour_ui(ui: &mut egui::Ui, review: &ReviewShown, at_m: Option<f64>, actions: &mut Vec<Action>) {
     let contour = &review.drawn.contour;
     let words = "Click the edge of the gland in the transverse picture, some six points in a plane; PgUp and PgDn step the probe. Drag moves \
-                 a point, the right button or Del removes it. Dashed: what other planes propose.";
+                 a point, the right button or Del removes it. Dashed: the outline proposed by other planes.";
     ui.label(theme::weak(words));
     let here = at_m
         .and_then(|at_m| contour.at(at_m))
@@ -108,7 +108,7 @@ fn contour_ui(ui: &mut egui::Ui, review: &ReviewShown, at_m: Option<f64>, action
 fn marks_ui(ui: &mut egui::Ui, shown: &Shown) {
     let review = &shown.planning.review;
     let words =
-        "Click each seed where it is seen, in either picture. Drag moves a mark, the right button or Del removes it.";
+        "Click each seed that you see, in either picture. Drag moves a mark, the right button or Del removes it.";
     ui.label(theme::weak(words));
     let marks = review.drawn.marks_m.len();
     let without_mark = review.marks.without_mark();
@@ -122,7 +122,7 @@ fn marks_ui(ui: &mut egui::Ui, shown: &Shown) {
     }
     if let Some([mean, worst]) = review.marks.residuals_m() {
         ui.label(theme::small(format!(
-            "Marks off their seeds, mm: mean {:.1}, worst {:.1}",
+            "From mark to seed, mm: mean {:.1}, worst {:.1}",
             format::mm(mean),
             format::mm(worst)
         )));

@@ -53,7 +53,7 @@ pub fn setup_ui(ui: &mut egui::Ui, shown: &Shown) {
 fn thread(report: &ThreadReport) -> String {
     let policy = match report.policy {
         1 => format!("SCHED_FIFO {}", report.priority),
-        _ => format!("not SCHED_FIFO, {} asked", report.asked_priority),
+        _ => format!("not SCHED_FIFO, {} requested", report.asked_priority),
     };
     match report.core {
         u32::MAX => format!("{policy}, any core"),

@@ -100,7 +100,7 @@ fn settings_ui(ui: &mut egui::Ui, settings: &mut Settings) {
     let drag = DragValue::new(&mut settings.seed_strength_u)
         .range(STRENGTHS_U[0]..=STRENGTHS_U[1])
         .speed(0.01)
-        .max_decimals(3)
+        .fixed_decimals(3)
         .update_while_editing(false)
         .suffix(" U");
     ui.add(drag).labelled_by(label.id);
@@ -170,8 +170,8 @@ fn line_ui(ui: &mut egui::Ui, shown: &Shown) {
         Some(NeedleLine::Preparing) => (
             preparing.trim_end(),
             tokens.warn,
-            "The tissue along the needle is being computed: seconds waited, of those that the last one took. Hold the needle at its \
-             entry until this says LINE READY.",
+            "The tissue along the needle is being computed: seconds so far, of those for the last needle. Hold the needle at its \
+             entry until LINE READY appears here.",
         ),
         Some(NeedleLine::Missing) => (
             "NO LINE",

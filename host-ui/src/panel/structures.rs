@@ -252,7 +252,7 @@ fn foot_ui(ui: &mut egui::Ui, shown: &Shown, table: &mut StructureTable) -> Opti
     let is_whole = missing.is_none();
     ui.label(match &missing {
         Some(why) => RichText::new(why).color(tokens.warn),
-        None => theme::weak("These structures can be the scene."),
+        None => theme::weak("These structures make a scene."),
     });
     let mut action = None;
     ui.horizontal_wrapped(|ui| {

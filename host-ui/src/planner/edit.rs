@@ -1,18 +1,17 @@
 //! Changes of the plan, each one step to undo, and the limits on them.
 
 use super::{Failure, Planner};
+use crate::words::counted;
 use std::time::{Duration, Instant};
 use stylet_implant::plan::{History, Hole, ImplantPlan, Row, exchange};
 use stylet_shm_schema::MAX_SEEDS;
 
 /// Time within which changes of one needle count as one step to undo.
 const ONE_STEP: Duration = Duration::from_millis(800);
-/// Strength of the seeds of a new plan.
-const STRENGTH_U: f64 = 0.5;
 
 impl Planner {
     pub(super) fn planned(&self) -> Result<&ImplantPlan, Failure> {
-        self.plan().ok_or_else(|| "there is no plan yet; make one".into())
+        self.plan().ok_or_else(|| "There is no plan yet; make one.".into())
     }
 
     /// Begins an empty plan.
@@ -41,16 +40,18 @@ impl Planner {
         self.change();
     }
 
-    /// Adds a needle through the hole, with as many seeds as fill the target behind it.
-    pub fn add(&mut self, hole: Hole) {
-        let piece = self.planning.outlines.as_ref().and_then(|g| g.piece_m(hole));
+    /// Adds a needle through the hole, with as many seeds as fill the target behind it, as strong as those of the plan;
+    /// the first ones have `first_u`.
+    pub fn add(&mut self, hole: Hole, first_u: f64) {
+        let piece = self.planning.outlines.as_ref().map(|g| g.piece_m(hole));
         let strength_u = |plan: &ImplantPlan| {
             let seeds = plan.needles.iter().flat_map(|n| &n.seeds);
-            seeds.map(|s| s.strength_u).next().unwrap_or(STRENGTH_U)
+            seeds.map(|s| s.strength_u).next().unwrap_or(first_u)
         };
         self.edit(|plan| {
-            let piece_m =
-                piece.ok_or_else(|| format!("a needle through {hole} would miss the target; choose another hole"))?;
+            let piece_m = piece
+                .ok_or("The scene's anatomy is not ready yet; try again in a moment.")?
+                .map_err(|why| format!("A needle through {hole} {why}; choose another hole."))?;
             let added = plan.with_needle(hole, piece_m[1])?;
             Ok::<_, Failure>(added.with_row(plan.needles.len(), Row::filling(piece_m, strength_u(plan)))?)
         });
@@ -121,7 +122,7 @@ impl Planner {
     pub(super) fn can_be(&self, plan: ImplantPlan) -> Result<ImplantPlan, Failure> {
         if plan.seed_count() > MAX_SEEDS {
             let count = plan.seed_count();
-            return Err(format!("that would be {count} seeds; at most {MAX_SEEDS} can be placed").into());
+            return Err(format!("That would be {count} seeds; at most {MAX_SEEDS} can be placed.").into());
         }
         match self.plan() {
             Some(before) => self.keeps(before, &plan).map(|()| plan),
@@ -133,7 +134,8 @@ impl Planner {
         let begun = self.planning.progress.begun();
         let first = |plan: &ImplantPlan| plan.needles.iter().take(begun).cloned().collect::<Vec<_>>();
         if begun > 0 && first(before) != first(after) {
-            return Err(format!("{begun} needles are already inserted; only those after them can be changed").into());
+            let needles = counted(begun, "needle");
+            return Err(format!("{needles} already inserted; only later ones can be changed.").into());
         }
         Ok(())
     }

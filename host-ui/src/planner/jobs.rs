@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
+use stylet_base::format;
 use stylet_base::interrupt::Interrupt;
 use stylet_base::job::Job;
 use stylet_dose::decay::Interval;
@@ -98,7 +99,7 @@ impl Planner {
     {
         let work = match (&self.planning.outlines, self.is_busy()) {
             (_, true) => return,
-            (None, _) => Err("the scene's anatomy is not ready yet; try again in a moment".into()),
+            (None, _) => Err("The scene's anatomy is not ready yet; try again in a moment.".into()),
             (Some(outlines), false) => prepare(self, outlines.clone()),
         };
         match work {
@@ -123,7 +124,7 @@ impl Planner {
 
     /// Starts a search for a first plan.
     pub fn automatic(&mut self) {
-        self.begin_job("Looking for a first plan", |_, outlines| {
+        self.begin_job("Searching for a plan", |_, outlines| {
             Ok(move |reporter: &Reporter<'_>| {
                 let (source, prescription_gy) = exchange::usual()?;
                 let kernel = DoseKernel::new(&source, Interval::ALL);
@@ -160,7 +161,7 @@ impl Planner {
             let plan = planner.planned()?.clone();
             Ok(move |_: &Reporter<'_>| {
                 let source = Source::known(&plan.source)
-                    .ok_or_else(|| format!("source {} is unknown; set the strength by hand", plan.source))?;
+                    .ok_or_else(|| format!("Source {} is unknown; set the strength by hand.", plan.source))?;
                 let kernel = DoseKernel::new(&source, Interval::ALL);
                 let strength_u = first::strength_u(&plan, &outlines.anatomy, &kernel)?;
                 Ok(JobMessage::Plan(plan.with_strength(strength_u), Vec::new()))
@@ -211,10 +212,11 @@ impl Planner {
     pub fn compensate(&mut self, instance: Instance, pace: Pace) {
         self.begin_job("Rehearsing", |planner, _| {
             let begun = planner.planning.progress.begun();
-            let left = planner.planned()?.needles.iter().skip(begun);
-            let needles: Vec<Needle> = left.filter(|n| !n.seeds.is_empty()).cloned().collect();
+            let left = planner.planned()?.needles.iter().enumerate().skip(begun);
+            let loaded = left.filter(|(_, needle)| !needle.seeds.is_empty());
+            let needles: Vec<(usize, Needle)> = loaded.map(|(number, needle)| (number, needle.clone())).collect();
             if needles.is_empty() {
-                return Err("no needle with seeds is left to rehearse".into());
+                return Err("No needle with seeds is left to rehearse.".into());
             }
             Ok(move |reporter: &Reporter<'_>| compensate_all(instance, &needles, &pace, reporter))
         });
@@ -223,7 +225,7 @@ impl Planner {
 
 fn compensate_all(
     instance: Instance,
-    needles: &[Needle],
+    needles: &[(usize, Needle)],
     pace: &Pace,
     reporter: &Reporter<'_>,
 ) -> Result<JobMessage, Failure> {
@@ -231,16 +233,16 @@ fn compensate_all(
     let begun = Instant::now();
     while link.scene().is_none() || link.state().is_none() {
         if reporter.interrupt.asked() || begun.elapsed() > FIND_LIMIT {
-            return Err("rt-core does not answer; check that it is running".into());
+            return Err("rt-core does not answer; check that it is running.".into());
         }
         link.poll();
         std::thread::sleep(POLL_EVERY);
     }
-    let mut failed = Vec::new();
-    for (number, needle) in needles.iter().enumerate() {
-        let name = needle.hole.map_or_else(|| format!("{}", number + 1), |h| h.to_string());
-        let what = format!("Rehearsing needle {} of {}, {name}", number + 1, needles.len());
-        reporter.is_at(what, number as f32 / needles.len() as f32);
+    let (mut failed, begun) = (Vec::new(), Instant::now());
+    for (at, (number, needle)) in needles.iter().enumerate() {
+        let name = name_of(*number, needle);
+        let (what, share) = rehearsing(needles, at, begun.elapsed());
+        reporter.is_at(what, share);
         let mut rehearser = LinkRehearser {
             stabilising: &[],
             earlier: &[],
@@ -249,12 +251,59 @@ fn compensate_all(
         };
         match compensate(needle, pace, &Limits::default(), &mut rehearser) {
             Ok(done) => reporter.send(JobMessage::Compensated(Box::new((needle.clone(), done)))),
-            Err(_) if reporter.interrupt.asked() => return Err("the compensation was cancelled".into()),
-            Err(why) => failed.push(format!("needle {name}: {why}")),
+            Err(_) if reporter.interrupt.asked() => return Err("The compensation was cancelled.".into()),
+            Err(why) => failed.push(format!("{name}: {why}")),
         }
     }
     match failed.as_slice() {
         [] => Ok(JobMessage::End(format!("{} needles compensated.", needles.len()))),
         _ => Err(format!("Not compensated: {}", failed.join("; ")).into()),
+    }
+}
+
+/// Returns a name such as "needle 3 (F7)", by the number in the plan.
+fn name_of(number: usize, needle: &Needle) -> String {
+    let hole = needle.hole.map_or_else(String::new, |hole| format!(" ({hole})"));
+    format!("needle {}{hole}", number + 1)
+}
+
+/// Returns the progress before one of the needles, in words and as a share of their seeds, with the time left once a
+/// needle is done: a needle takes about as long as it has seeds.
+fn rehearsing(needles: &[(usize, Needle)], at: usize, elapsed: Duration) -> (String, f32) {
+    let seeds = |of: &[(usize, Needle)]| of.iter().map(|(_, needle)| needle.seeds.len()).sum::<usize>() as f64;
+    let (number, needle) = &needles[at];
+    let share = seeds(&needles[..at]) / seeds(needles);
+    let left = match at {
+        0 => String::new(),
+        _ => {
+            let left_s = elapsed.as_secs_f64() * (1.0 - share) / share;
+            format!("; {}", format::time_left(left_s))
+        }
+    };
+    let name = name_of(*number, needle);
+    (
+        format!("Rehearsing {name}, {} of {}{left}", at + 1, needles.len()),
+        share as f32,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::planner::tests::planned;
+
+    /// Guards against minutes of compensation without the time left, and needles counted unlike those of the plan.
+    #[test]
+    fn a_rehearsal_names_its_needle_and_the_time_left() {
+        let needles: Vec<(usize, Needle)> = planned()
+            .needles
+            .into_iter()
+            .enumerate()
+            .map(|(n, of)| (n + 5, of))
+            .collect();
+        let at = |at, s| rehearsing(&needles, at, Duration::from_secs(s));
+        assert_eq!(at(0, 0), ("Rehearsing needle 6 (E7), 1 of 2".to_owned(), 0.0));
+        let second = "Rehearsing needle 7 (I7), 2 of 2; about 4 min left".to_owned();
+        assert_eq!(at(1, 240), (second, 0.5));
     }
 }

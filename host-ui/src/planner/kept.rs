@@ -20,6 +20,8 @@ pub struct KeptPlan {
     pub plan: ImplantPlan,
     /// Rehearsed needles with their compensation.
     pub compensated: Vec<(Needle, Compensation)>,
+    /// Needles that were inserted.
+    pub progress: NeedleProgress,
 }
 
 /// Plan out of use, with its history, compensation and progress.
@@ -36,6 +38,7 @@ struct Stored {
     plan: String,
     /// Compensation by number of the needle.
     compensated: Vec<(usize, Compensation)>,
+    progress: NeedleProgress,
 }
 
 /// Returns the file for a scene of a run of the core.
@@ -55,6 +58,7 @@ impl KeptPlan {
         let stored = Stored {
             plan,
             compensated: compensated.collect(),
+            progress: self.progress.clone(),
         };
         if let Ok(bytes) = serde_json::to_vec(&stored) {
             let _kept = write_whole(path, &bytes);
@@ -67,7 +71,11 @@ impl KeptPlan {
         let plan = file::from_text(&stored.plan, frames).ok()?;
         let needle = |(number, done): (usize, Compensation)| Some((plan.needles.get(number)?.clone(), done));
         let compensated = stored.compensated.into_iter().filter_map(needle).collect();
-        Some(Self { plan, compensated })
+        Some(Self {
+            plan,
+            compensated,
+            progress: stored.progress,
+        })
     }
 }
 
@@ -100,7 +108,7 @@ impl Planner {
             && self.history.is_none()
         {
             self.put(kept.plan);
-            self.compensated = kept.compensated;
+            (self.compensated, self.planning.progress) = (kept.compensated, kept.progress);
             self.message = Some(Note::done("The plan of this implant was restored.".to_owned()));
         }
     }
@@ -119,6 +127,7 @@ impl Planner {
         let kept = self.plan().map(|plan| KeptPlan {
             plan: plan.clone(),
             compensated: self.compensated.clone(),
+            progress: self.planning.progress.clone(),
         });
         self.keeping = Some(Job::begin("keep plan", move |_, _| match kept {
             Some(kept) => kept.write(&path, &frames),
@@ -173,7 +182,7 @@ mod tests {
     fn a_plan_is_found_again_with_its_compensation() {
         let mut planner = super::super::tests::planner();
         let plan = planner.plan().expect("a plan").clone();
-        planner.restart();
+        planner.begin_needle(0, 0);
         let done = Compensation {
             drops: Drops::as_planned(&plan.needles[1]),
             before_m: None,
@@ -194,12 +203,14 @@ mod tests {
         let kept = KeptPlan {
             compensated: vec![(plan.needles[1].clone(), done.clone())],
             plan: plan.clone(),
+            progress: planner.progress().clone(),
         };
         kept.write(&path, &frames);
         let found = KeptPlan::read(&path, &frames).expect("found");
         assert_eq!(found.plan.needles.len(), plan.needles.len());
         assert_eq!(found.compensated.len(), 1);
         assert_eq!(found.compensated[0].1, done);
+        assert_eq!(found.progress, *planner.progress());
         std::fs::write(&path, b"{}").expect("written");
         assert!(
             KeptPlan::read(&path, &frames).is_none(),

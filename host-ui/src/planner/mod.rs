@@ -141,6 +141,7 @@ impl Planner {
         if self.planning.progress.is_undone(seeds) {
             self.restart();
         }
+        self.advance(|progress| progress.take(seeds));
         self.write_kept();
         self.show();
     }
@@ -169,7 +170,7 @@ impl Planner {
             self.compensated.clear();
         } else if before != self.body && !self.compensated.is_empty() {
             self.message = Some(Note::done(
-                "The rehearsals are those of the core before. Compensate again if this one has other settings."
+                "The rehearsals are from the previous core. Compensate again if this one has other settings."
                     .to_owned(),
             ));
         }
@@ -181,7 +182,7 @@ impl Planner {
         if self.of_scene.as_ref() != Some(&of_scene) {
             if self.history.is_some() {
                 self.message = Some(Note::done(
-                    "The plan is set aside: it returns with its scene.".to_owned(),
+                    "The plan was set aside: it returns with its scene.".to_owned(),
                 ));
             }
             self.set_aside();
@@ -209,7 +210,7 @@ impl Planner {
                     self.change();
                 }
                 JobUpdate::Message(Err(why)) => self.no_outlines(key, template, &why.to_string()),
-                JobUpdate::Ended => self.no_outlines(key, template, "the scene's anatomy could not be determined"),
+                JobUpdate::Ended => self.no_outlines(key, template, "its anatomy could not be determined"),
             }
             return;
         }
@@ -312,6 +313,7 @@ impl Planner {
         let before = self.planning.progress.clone();
         advance(&mut self.planning.progress);
         if self.planning.progress != before {
+            self.to_keep = true;
             self.refresh();
         }
     }
@@ -341,7 +343,6 @@ impl Planner {
 
     /// Marks a needle as being inserted, with this number of seeds in the tissue.
     pub fn begin_needle(&mut self, number: usize, seeds: usize) {
-        self.to_keep = true;
         self.advance(|progress| progress.begin(number, seeds));
     }
 

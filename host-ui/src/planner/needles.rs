@@ -1,5 +1,6 @@
 //! Progress of the needles: those done, and the seeds of each.
 
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Progress of one needle.
@@ -25,7 +26,7 @@ impl NeedleState {
 }
 
 /// Progress of the needles, which are inserted one after the other in the order of the plan.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NeedleProgress {
     /// Number of seeds in the tissue before each needle that has begun.
     first_seed: Vec<usize>,
@@ -43,12 +44,6 @@ impl NeedleProgress {
     /// Returns whether all needles that have begun are done.
     pub fn is_done(&self) -> bool {
         self.begun() > 0 && self.is_done
-    }
-
-    /// Returns whether they are, with this number of seeds in the tissue: a seed that was undone
-    /// must be dropped again.
-    pub fn is_done_with(&self, seeds: usize) -> bool {
-        self.is_done() && seeds >= self.seeds_when_done
     }
 
     /// Returns the number of needles that are done.
@@ -82,6 +77,11 @@ impl NeedleProgress {
         }
     }
 
+    /// Takes the number of seeds in the tissue: a seed that was undone must be dropped again.
+    pub fn take(&mut self, seeds: usize) {
+        self.is_done &= seeds >= self.seeds_when_done;
+    }
+
     /// Removes the inserted needle from the progress.
     pub fn step_back(&mut self) {
         if let Some(seeds) = self.first_seed.pop() {
@@ -105,9 +105,10 @@ impl NeedleProgress {
         }
     }
 
-    /// Returns whether seeds of earlier needles were removed, so that the implantation restarts.
+    /// Returns whether seeds of needles that were done are gone, so that the implantation restarts.
     pub fn is_undone(&self, seeds: usize) -> bool {
-        self.first_seed.last().is_some_and(|&first| seeds < first)
+        let is_first_undone = self.is_done() && seeds == 0 && self.seeds_when_done > 0;
+        is_first_undone || self.first_seed.last().is_some_and(|&first| seeds < first)
     }
 }
 
@@ -124,7 +125,12 @@ mod tests {
         assert_eq!(progress.own_seeds(4), 0..4);
         progress.finish(4);
         assert_eq!((progress.state(0), progress.done()), (NeedleState::Done, 1));
-        assert!(progress.is_done_with(4) && !progress.is_done_with(3));
+        let mut undone = progress.clone();
+        undone.take(3);
+        assert_eq!((undone.state(0), undone.is_undone(3)), (NeedleState::Inserted, false));
+        // A reset after the first needle used to leave it done, so that the second one was next.
+        assert!(progress.is_undone(0));
+        progress.take(4);
         // The second needle has no seeds and is skipped.
         progress.begin(2, 4);
         assert_eq!(progress.own_seeds(6), 4..6);

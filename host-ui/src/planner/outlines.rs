@@ -2,6 +2,7 @@
 
 use super::Failure;
 use nalgebra::Vector3;
+use std::fmt;
 use std::hash::{DefaultHasher, Hasher};
 use stylet_anatomy::PatientFrame;
 use stylet_host::link::SceneModel;
@@ -23,8 +24,8 @@ pub type Outline = Vec<[f32; 2]>;
 pub struct Layer {
     /// Outlines of the target.
     pub target: Vec<Outline>,
-    /// Outlines of the spared structures.
-    pub spared: Vec<Outline>,
+    /// Outlines of the spared structures, each with the structure's number in the anatomy.
+    pub spared: Vec<(usize, Outline)>,
 }
 
 /// Anatomy of a scene, cut in layers parallel to a template.
@@ -42,7 +43,25 @@ pub struct AnatomyOutlines {
     /// Distances from the template's face to the near and the far end of the target, m.
     pub depths_m: [f64; 2],
     layers: Vec<Layer>,
-    pieces_m: Vec<Option<[f64; 2]>>,
+    pieces_m: Vec<Result<[f64; 2], NoPiece>>,
+}
+
+/// Reason why a hole leads to no place for seeds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum NoPiece {
+    /// The needle goes past the target.
+    Aside,
+    /// The needle goes through this structure to be spared instead.
+    Through(String),
+}
+
+impl fmt::Display for NoPiece {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Aside => f.write_str("would miss the target"),
+            Self::Through(name) => write!(f, "would go through {name}, which is to be spared"),
+        }
+    }
 }
 
 impl AnatomyOutlines {
@@ -66,10 +85,11 @@ impl AnatomyOutlines {
             let depth_m = depths_m[0] + number as f64 * LAYER_M;
             Layer {
                 target: outlines(&template, &anatomy.target, depth_m),
-                spared: anatomy
-                    .spared
-                    .iter()
-                    .flat_map(|body| outlines(&template, body, depth_m))
+                spared: (anatomy.spared.iter().enumerate())
+                    .flat_map(|(n, body)| {
+                        let lines = outlines(&template, body, depth_m);
+                        lines.into_iter().map(move |line| (n, line))
+                    })
                     .collect(),
             }
         };
@@ -79,9 +99,12 @@ impl AnatomyOutlines {
                 .pieces_m(template.hole_m(hole), template.inwards, depths_m[1]);
             let longest = pieces
                 .into_iter()
-                .max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
-            let inside = [longest[0] + INSET_M, longest[1] - INSET_M];
-            (inside[1] > inside[0]).then_some(inside)
+                .max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
+            let inside = longest.map(|[from, to]| [from + INSET_M, to - INSET_M]);
+            inside.filter(|[from, to]| to > from).ok_or_else(|| {
+                let in_the_way = anatomy.spared_in_the_way(template.hole_m(hole), template.inwards, depths_m[1], 0.0);
+                in_the_way.map_or(NoPiece::Aside, |body| NoPiece::Through(body.name.clone()))
+            })
         };
         Self {
             scene,
@@ -102,10 +125,10 @@ impl AnatomyOutlines {
     }
 
     /// Returns the near and far depth of seeds in a needle through the hole, from the template's
-    /// face, m; `None` if it misses the target.
-    pub fn piece_m(&self, hole: Hole) -> Option<[f64; 2]> {
+    /// face, m, or why there is no place for them.
+    pub fn piece_m(&self, hole: Hole) -> Result<[f64; 2], NoPiece> {
         let number = usize::from(hole.row()) * usize::from(HOLES) + usize::from(hole.column());
-        *self.pieces_m.get(number)?
+        self.pieces_m.get(number).cloned().unwrap_or(Err(NoPiece::Aside))
     }
 }
 
@@ -193,6 +216,19 @@ mod tests {
             assert!((from - (0.07 - half_m)).abs() < 1e-3, "{name}: from {from}");
             assert!((to - (0.07 + half_m)).abs() < 1e-3, "{name}: to {to}");
         }
-        assert_eq!(piece("A1"), None);
+        assert_eq!(piece("A1"), Err(NoPiece::Aside));
+    }
+
+    /// Guards against "misses the target" for a needle through the urethra.
+    #[test]
+    fn a_hole_before_the_urethra_says_so() {
+        let AnatomyOutlines { anatomy, template, .. } = outlines();
+        let aside = Anatomy {
+            target: ball("gland", [0.09, 0.05, 0.06], HALF_M),
+            ..anatomy
+        };
+        let outlines = AnatomyOutlines::on(aside, SceneId::default(), template);
+        let why = outlines.piece_m(Hole::middle()).expect_err("the urethra");
+        assert_eq!(why.to_string(), "would go through urethra, which is to be spared");
     }
 }

@@ -7,6 +7,7 @@ mod outside;
 mod parts;
 mod second;
 mod seeds;
+mod tip;
 
 use crate::dose_worker::DoseResult;
 pub use crate::planner::Note;
@@ -52,6 +53,8 @@ pub struct Shown {
     pub parameters: Option<ParametersInForce>,
     pub seeds: Vec<SeedPose>,
     pub seed_places: SeedPlaces,
+    /// True if the tip is in the body without contact, as after a reset: it meets no tissue until it has been outside.
+    pub is_free_inside: bool,
     /// Planned seeds, from the plans in force that were received.
     pub heard: Vec<ReceivedSeed>,
     /// Number of seeds that the last reset removed, until another is dropped.
@@ -143,6 +146,7 @@ impl Shown {
             self.left.extend_from_slice(snapshot.header.left());
             self.snapshot_residual = Some(snapshot.header.residual);
         }
+        self.take_tip(link);
         self.take_removed(seeds_before, link);
         self.take_given_up(link);
         self.take_line_wait();
@@ -194,11 +198,6 @@ impl Shown {
         self.has_flag(flags::PUNCTURED)
     }
 
-    /// Returns whether the tip touches tissue, or is behind a membrane.
-    pub fn is_in_tissue(&self) -> bool {
-        self.has_punctured() || self.has_flag(flags::IN_CONTACT)
-    }
-
     /// Returns the fault; `None` for a number that this program does not know, which is a fault
     /// too.
     pub fn fault(&self) -> Option<Fault> {
@@ -219,10 +218,6 @@ impl Shown {
             Some(None) => "unknown",
             Some(Some(phase)) => phase.name(),
         }
-    }
-
-    pub fn tip_m(&self) -> Option<[f64; 3]> {
-        self.state.filter(|s| s.tick > 0).map(|s| s.tip_in_scene_m)
     }
 
     pub fn planned(&self) -> &[PlannedSeed] {

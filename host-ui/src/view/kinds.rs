@@ -35,20 +35,22 @@ impl Kind {
     ];
 
     fn of(structure: &StructureInfo) -> Self {
-        let name = structure.name.read();
+        match structure.role {
+            bits if bits & role::TARGET != 0 => Self::Gland,
+            bits if bits & role::FIXED != 0 => Self::Bone,
+            _ => Self::of_spared(&structure.name.read()),
+        }
+    }
+
+    /// Returns the kind of a structure to be spared, by its name.
+    pub fn of_spared(name: &str) -> Self {
         let at_risk = [
             (Organ::Urethra, Self::Urethra),
             (Organ::RectalWall, Self::Rectum),
             (Organ::Bladder, Self::Bladder),
         ];
-        match structure.role {
-            bits if bits & role::TARGET != 0 => Self::Gland,
-            bits if bits & role::FIXED != 0 => Self::Bone,
-            _ => {
-                let named = at_risk.into_iter().find(|(organ, _)| organ.is_mentioned_in(&name));
-                named.map_or(Self::Spared, |(_, kind)| kind)
-            }
-        }
+        let named = at_risk.into_iter().find(|(organ, _)| organ.is_mentioned_in(name));
+        named.map_or(Self::Spared, |(_, kind)| kind)
     }
 
     /// Returns its name in the legend.
@@ -88,6 +90,14 @@ impl Kind {
         }
     }
 
+    /// Returns the colour of its outline in a panel, the same as over an image if the panel is dark too.
+    pub fn panel_color(self, tokens: &Tokens) -> Color32 {
+        match tokens.dark {
+            true => self.image_color(),
+            false => self.color(tokens),
+        }
+    }
+
     /// Returns its share of the opacity that a person set: structures around the gland must not
     /// hide it.
     pub fn share(self) -> f32 {
@@ -110,6 +120,29 @@ pub fn kinds(scene: Option<&SceneHeader>) -> impl Iterator<Item = Kind> {
     std::iter::once(body).chain(inner)
 }
 
+/// Longest name of a structure in the legend.
+const LONGEST_NAME: usize = 24;
+
+/// Returns the kinds that are drawn, in the order of the legend. The only structure of a kind keeps its own name, as in
+/// the table of doses.
+pub fn named(scene: &SceneHeader) -> Vec<(Kind, String)> {
+    let structures = shown_alone(scene).into_iter();
+    let structures: Vec<&StructureInfo> = structures.filter_map(|(n, _)| scene.structures().get(n)).collect();
+    let drawn: Vec<Kind> = kinds(Some(scene)).collect();
+    let name = |kind: Kind| {
+        let mut own = structures.iter().filter(|s| Kind::of(s) == kind).map(|s| s.name.read());
+        let only = own
+            .next()
+            .filter(|name| own.next().is_none() && name.chars().count() <= LONGEST_NAME);
+        (kind, only.unwrap_or_else(|| kind.name().to_owned()))
+    };
+    Kind::ALL
+        .into_iter()
+        .filter(|kind| drawn.contains(kind))
+        .map(name)
+        .collect()
+}
+
 /// Returns the indices of each surface, in the order of [`kinds`].
 pub fn surfaces(bodies: &Bodies) -> Vec<Vec<u32>> {
     let triangles = |part: &Range<usize>| bodies.triangles.get(part.clone()).unwrap_or(&[]);
@@ -119,4 +152,44 @@ pub fn surfaces(bodies: &Bodies) -> Vec<Vec<u32>> {
         .iter()
         .map(|part| mesh::indices(triangles(part), count))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::theme::DARK;
+    use bytemuck::Zeroable;
+    use stylet_shm_schema::Text;
+
+    /// Guards against "rectum" in the legend beside "rectal wall" in the table of doses.
+    #[test]
+    fn the_legend_has_the_names_of_the_structures() {
+        let mut scene = SceneHeader::zeroed();
+        let names = [
+            ("gland", role::TARGET),
+            ("rectal wall", role::SPARE),
+            ("bowel", role::SPARE),
+            ("penile bulb", role::SPARE),
+        ];
+        scene.structure_count = names.len() as u32;
+        for (structure, (name, role)) in scene.structures.iter_mut().zip(names) {
+            (structure.name, structure.role, structure.element_count) = (Text::new(name), role, 1);
+        }
+        let listed: Vec<String> = named(&scene).into_iter().map(|(_, name)| name).collect();
+        assert_eq!(listed, ["gland", "rectal wall", "to be spared", "body"]);
+    }
+
+    /// Guards against urethra and rectum in one colour on the template, and in their own in the slices.
+    #[test]
+    fn a_structure_has_one_colour_in_slices_and_template() {
+        for (name, kind) in [
+            ("urethra", Kind::Urethra),
+            ("rectal wall", Kind::Rectum),
+            ("bladder wall", Kind::Bladder),
+            ("bowel", Kind::Spared),
+        ] {
+            assert_eq!(Kind::of_spared(name), kind);
+            assert_eq!(kind.panel_color(&DARK), kind.image_color());
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Text over the three-dimensional picture: axes, landmarks, the scale bar, and the legend.
 
 use super::camera::Camera;
-use super::kinds::{Kind, kinds};
+use super::kinds::named;
 use super::scene3d::Look;
 use super::state::ViewState;
 use crate::dose_worker::{DoseResult, LEVELS};
@@ -133,9 +133,8 @@ impl Legend<'_> {
         };
         let t = self.tokens;
         if let Some(scene) = &self.shown.scene {
-            let drawn: Vec<Kind> = kinds(Some(scene)).collect();
-            for kind in Kind::ALL.into_iter().filter(|kind| drawn.contains(kind)) {
-                list(kind.name(), kind.color(t), true);
+            for (kind, name) in named(scene) {
+                list(&name, kind.color(t), true);
             }
         }
         if look.rest_shape {

@@ -220,7 +220,7 @@ impl Middle {
         let mut measuring = self.view.measure.active;
         let measure = ui.toggle_value(&mut measuring, "Measure");
         if measure
-            .on_hover_text("Key M: click two places in any picture")
+            .on_hover_text("Key M: the distance between two clicks in any picture")
             .clicked()
         {
             actions.push(Action::ToggleMeasure);

@@ -9,7 +9,7 @@ pub(crate) mod driver;
 mod fluoro;
 pub(crate) mod free;
 mod gpu;
-mod kinds;
+pub(crate) mod kinds;
 mod legend;
 mod marks;
 pub mod middle;

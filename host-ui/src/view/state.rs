@@ -63,6 +63,8 @@ pub struct ViewState {
     pub cursor_m: Vector3<f64>,
     /// True if the slices go through the tip of the needle.
     pub follow_tip: bool,
+    /// True in the frame in which the slices were moved off the tip by hand.
+    pub has_left_tip: bool,
     pub measure: Measure,
     /// Tool on the picture of the probe.
     pub tool: Option<Tool>,
@@ -78,6 +80,7 @@ impl Default for ViewState {
         Self {
             cursor_m: Vector3::repeat(0.03),
             follow_tip: true,
+            has_left_tip: false,
             measure: Measure::default(),
             tool: None,
             section: None,
@@ -87,9 +90,25 @@ impl Default for ViewState {
     }
 }
 
+impl ViewState {
+    /// Lets the operator move the slices, which then stay where they are.
+    pub fn leave_tip(&mut self) {
+        self.has_left_tip |= std::mem::replace(&mut self.follow_tip, false);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn slices_that_leave_the_tip_say_so_once() {
+        let mut view = ViewState::default();
+        view.leave_tip();
+        assert!(!view.follow_tip && std::mem::take(&mut view.has_left_tip));
+        view.leave_tip();
+        assert!(!view.has_left_tip);
+    }
 
     #[test]
     fn two_clicks_measure_and_a_third_begins_a_new_distance() {

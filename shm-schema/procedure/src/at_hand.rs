@@ -10,6 +10,8 @@ pub struct AtHand {
     pub depth_m: f64,
     /// Distance of the tip from the path, m.
     pub beside_m: f64,
+    /// True if the tip is in the body without contact, as after a reset: it meets no tissue until it has been outside.
+    pub is_free_inside: bool,
     /// Speed of the tip along the needle, m/s; `None` while unknown.
     pub speed_m_per_s: Option<f64>,
     /// Seeds that this needle has dropped.
@@ -25,6 +27,9 @@ impl AtHand {
     pub fn step(&self) -> Step {
         if self.next_drop_m.is_none() {
             return if self.is_outside() { Step::Done } else { Step::Retract };
+        }
+        if self.is_free_inside {
+            return Step::Place;
         }
         let is_deep = self
             .deepest_drop_m
@@ -81,6 +86,7 @@ mod tests {
         AtHand {
             depth_m,
             beside_m: 0.0,
+            is_free_inside: false,
             speed_m_per_s: Some(0.0),
             dropped,
             deepest_drop_m: Some(drops_m[0]),
@@ -120,6 +126,17 @@ mod tests {
         assert_eq!(beside.step(), Step::Place);
         assert_eq!(at(-6e-3, 0).step(), Step::Place);
         assert_eq!(at(-4e-3, 0).step(), Step::Insert);
+        for depth_m in [0.01, 0.03] {
+            let untouched = AtHand {
+                is_free_inside: true,
+                ..at(depth_m, 0)
+            };
+            assert_eq!(
+                untouched.next(),
+                Some(Operation::Place),
+                "{depth_m} m deep after a reset"
+            );
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::driven::Driven;
 use egui_kittest::kittest::Queryable;
+use host_ui::app::App;
 use std::path::Path;
 use stylet_shm_schema::role;
 use stylet_tests::scratch;
@@ -50,7 +51,7 @@ fn labels_without_names_become_a_scene_that_can_be_planned() {
     for (label, name) in [("1", "Prostate"), ("2", "Urethra"), ("3", "Rectum")] {
         driven.type_into(label, name);
     }
-    driven.wait_for_label("These structures can be the scene.");
+    driven.wait_for_label("These structures make a scene.");
     driven.click("Save scene file");
     driven.wait_for_label("Saved as");
     driven.picture("own-data-named");
@@ -73,6 +74,18 @@ fn labels_without_names_become_a_scene_that_can_be_planned() {
         driven.window.query_all_by_label("met").count() >= 5,
         "limits of three structures"
     );
+
+    // Another core gets the structures by their names.
+    let run = |app: &App| app.link().session().map(|session| session.session_id);
+    let first = run(driven.window.state());
+    driven.core.kill_only();
+    driven.wait_for_label("Start it again");
+    driven.click("Start it again");
+    driven.until("the scene under the other core", |app| {
+        let scene = app.link().scene().filter(|scene| scene.header.structure_count == 3);
+        run(app) != first && scene.is_some_and(|scene| Some(scene.header.session_id) == run(app))
+    });
+    assert_eq!(names(&driven), expected);
 
     // The file alone is enough the next time.
     let other = Driven::open_plain([1366.0, 768.0]);

@@ -157,7 +157,7 @@ fn adding_moving_and_removing_needles_can_be_undone() {
     // A hole outside the target reports it and adds nothing.
     driven.click("A1: no needle");
     driven.press(Key::Enter);
-    driven.window.get_by_label_contains("would miss the target");
+    driven.window.get_by_label_contains("A1 would miss the target");
     assert_eq!(plan(&driven), one);
 }
 
@@ -271,6 +271,11 @@ fn a_stopped_script_continues_in_this_window_and_the_next() {
         NeedleState::Done,
         "the list said planned until the script went on"
     );
+    assert_eq!(
+        (found.state(1), found.seeds_of(1, 3)),
+        (NeedleState::Inserted, 2..3),
+        "the step of the drops said done although a seed was left"
+    );
     driven.click("Continue at needle 2 of 2");
     wait_long(&mut driven, "all needles", |app| app.planner().progress().done() == 2);
     driven.wait_for_label("All 2 needles are done.");
@@ -343,6 +348,7 @@ fn compensation_reports_progress_and_can_be_cancelled() {
     });
     driven.window.run_steps(2);
     driven.window.get_by_label_contains("1 of 3 needles compensated");
+    driven.window.get_by_label_contains("2 of 3; less than a minute left");
     driven.click("Cancel");
     driven.until("the end of the work", |app| !app.planner().is_busy());
     driven.picture("plan-compensated-in-part");

@@ -71,6 +71,19 @@ impl SceneModel {
         })
     }
 
+    /// Returns the label at a place at rest, scene frame, m; 0 outside the body.
+    pub fn label_at(&self, rest_m: [f64; 3]) -> u8 {
+        let grid = &self.header.labels;
+        let cell = [0, 1, 2].map(|a| ((rest_m[a] - grid.origin_m[a]) / grid.spacing_m).round());
+        let dims = grid.dims.map(f64::from);
+        if (0..3).any(|a| !(0.0..dims[a]).contains(&cell[a])) {
+            return 0;
+        }
+        let [x, y, z] = cell.map(|c| c as usize);
+        let n = (z * grid.dims[1] as usize + y) * grid.dims[0] as usize + x;
+        self.labels.get(n).copied().unwrap_or(0)
+    }
+
     /// Encodes the words behind the core's header: vertices, triangles, labels of the cells.
     pub fn words(&self) -> Vec<u32> {
         let positions = self.rest_m.iter().flatten().map(|c| c.to_bits());

@@ -102,7 +102,7 @@ pub enum ProcedureError {
     #[error(transparent)]
     Run(#[from] RunError),
     /// A fault stands, and re-arming was not requested.
-    #[error("{0}. See to its cause, then re-arm in the window (key E), or give --rearm")]
+    #[error("{0}. Remove its cause, then re-arm in the window (key E), or give --rearm")]
     FaultStands(RunError),
     /// The implant cannot be scored.
     #[error(transparent)]

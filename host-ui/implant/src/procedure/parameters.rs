@@ -77,7 +77,7 @@ pub(super) fn set(link: &mut Link, changes: &[ParameterChange], interrupted: &In
         Ok(())
     } else {
         Err(ProcedureError::NothingReceived(
-            "the core did not take the parameters up in time",
+            "the core did not apply the parameters in time",
         ))
     }
 }

@@ -107,3 +107,20 @@ fn a_late_host_attributes_seeds_on_its_needle() {
     assert_eq!(heard.seeds_before(), 2);
     assert_eq!(placed(&heard), [(1, Some(2)), (1, None)]);
 }
+
+/// Guards against the debrief of a reopened window, whose time was that of the window.
+#[test]
+fn a_host_that_joins_later_says_so_until_the_next_procedure() {
+    let heard = |seeds: &[SeedPose]| {
+        let mut heard = ReceivedProcedure::default();
+        heard.hear(&plan(1, 1), seeds);
+        heard.begin(None);
+        heard
+    };
+    assert!(!heard(&[]).trace().motion().is_from_middle);
+    let mut late = heard(&[seed(1, 0.05)]);
+    assert!(late.trace().motion().is_from_middle);
+    late.begin_anew();
+    late.begin(None);
+    assert!(!late.trace().motion().is_from_middle);
+}

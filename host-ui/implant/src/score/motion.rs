@@ -30,6 +30,8 @@ pub struct Motion {
     pub reinsertions: usize,
     /// Share of the ticks of this time that were seen, on which every figure here is based.
     pub seen: Seen,
+    /// True if the procedure had begun before the first record.
+    pub is_from_middle: bool,
 }
 
 impl Motion {

@@ -83,7 +83,8 @@ fn lost(score: &Score) -> Markup {
     html! {
         @if lost > 0 {
             p class="bad" {
-                (lost) " of " (placed + lost) " planned seeds were not placed: the tip was outside the tissue, or they had not been dropped yet."
+                (lost) " of " (placed + lost) " planned seeds are not in the tissue: they had not been dropped yet, or the tip was "
+                "outside when they were. The planned dose is that of all."
             }
         }
         @let (others, all) = (score.implant.unplanned.len(), score.seeds());
@@ -111,7 +112,7 @@ fn cards(score: &Score) -> Markup {
     let all = [
         (
             format!("{:.2} mm", mean * 1e3),
-            format!("mean distance of a seed from its plan, worst {:.2} mm", worst * 1e3),
+            format!("mean distance of the seeds from plan, worst {:.2} mm", worst * 1e3),
         ),
         (
             both(" D90 ", 0, "Gy"),
@@ -124,7 +125,7 @@ fn cards(score: &Score) -> Markup {
         (format!("{:.1} N", m.peak_force_n), "peak force on the hand".to_owned()),
         (
             format!("{:.0} mm/s", m.mean_insertion_m_per_s * 1e3),
-            format!("mean speed inwards, peak {:.0} mm/s", m.peak_insertion_m_per_s * 1e3),
+            format!("mean insertion speed, peak {:.0} mm/s", m.peak_insertion_m_per_s * 1e3),
         ),
         (
             clock(m.duration_s),
@@ -143,6 +144,11 @@ fn cards(score: &Score) -> Markup {
     });
     html! {
         (parts::cards(all.into_iter().chain(bent).map(|(value, what)| (html! { b { (value) } }, cell(what)))))
+        @if m.is_from_middle {
+            p class="note" {
+                "This window was opened during the procedure: force, speed, times and insertions are those since then."
+            }
+        }
         @if !m.seen.is_all() {
             p class="note" { "Force, speed and times cover the ticks that were seen: " (m.seen.words()) "." }
         }
@@ -195,7 +201,7 @@ fn measures(score: &Score) -> Markup {
     let head = ["Measure", "planned", "delivered", "change", "limit", "delivered dose"];
     html! {
         (parts::numbers(&head, &rows.collect::<Vec<_>>()))
-        @if score.is_one_needle() { p class="note" { "One needle is no implant: its dose has no limits to meet." } }
+        @if score.is_one_needle() { p class="note" { "One needle is not an implant: no dose limits apply." } }
     }
 }
 

@@ -32,6 +32,8 @@ pub struct Trace {
     contact_ns: Option<u64>,
     meter: MotionMeter,
     order: TickOrder,
+    /// True if the procedure had begun before the first record.
+    pub(crate) is_from_middle: bool,
 }
 
 impl Default for Trace {
@@ -47,6 +49,7 @@ impl Default for Trace {
             contact_ns: None,
             meter: MotionMeter::default(),
             order: TickOrder::default(),
+            is_from_middle: false,
         }
     }
 }
@@ -139,7 +142,10 @@ impl Trace {
 
     /// Returns the motion of the hand so far.
     pub fn motion(&self) -> Motion {
-        self.meter.motion()
+        Motion {
+            is_from_middle: self.is_from_middle,
+            ..self.meter.motion()
+        }
     }
 }
 

@@ -33,11 +33,11 @@ fn table(number: usize, update: &Reviewed) -> Markup {
     let rows = MEASURES.map(row);
     html! {
         p {
-            b { "Update " (number) ", " (if update.accepted { "taken" } else { "not taken" }) ": " }
+            b { "Update " (number) ", " (if update.accepted { "accepted" } else { "not accepted" }) ": " }
             "after " (update.update.begun) " needles and " (update.lying) " seeds, " (update.seeds_from.name()) ". "
             (left(update)) " " (contour(update)) " " (marks(update))
         }
-        (numbers(&["Measure", "lay in the tissue", "plan if continued", "plan updated"], &rows))
+        (numbers(&["Measure", "placed so far", "plan if continued", "updated plan"], &rows))
     }
 }
 

@@ -41,6 +41,7 @@ pub fn to_json(score: &Score) -> Value {
             "mean_insertion_mm_s": m.mean_insertion_m_per_s * 1e3, "peak_insertion_mm_s": m.peak_insertion_m_per_s * 1e3,
             "peak_force_n": m.peak_force_n, "largest_deflection_mm": m.deflection_m * 1e3, "insertions": m.insertions, "reinsertions": m.reinsertions,
             "ticks_seen": m.seen.seen, "ticks_not_seen": m.seen.unseen,
+            "begins_with_the_procedure": !m.is_from_middle,
         },
     })
 }

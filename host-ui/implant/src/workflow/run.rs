@@ -60,7 +60,7 @@ pub struct Placed {
     /// Number of seeds of each needle in the tissue.
     seeds: Vec<usize>,
     drops: usize,
-    /// First needle with something left to do.
+    /// First needle with something left to do; the number of needles if there is none.
     next: usize,
 }
 
@@ -96,7 +96,7 @@ impl Placed {
         Self {
             seeds,
             drops: made.len(),
-            next: next.unwrap_or(0),
+            next: next.unwrap_or(ways.len()),
             done,
         }
     }
@@ -107,7 +107,17 @@ impl Placed {
         made > 0 && (made < self.drops || self.done.inside.is_some())
     }
 
-    /// Returns the needle to continue with, counted from 0.
+    /// Returns whether a drop was made.
+    pub fn has_begun(&self) -> bool {
+        !self.done.drops.is_empty()
+    }
+
+    /// Returns whether a needle has left a seed, or is in the tissue.
+    pub fn is_begun(&self, needle: usize) -> bool {
+        self.seeds_of(needle) > 0 || self.done.inside.is_some_and(|(inside, _)| inside == needle)
+    }
+
+    /// Returns the needle to continue with, counted from 0; the number of needles if all are done.
     pub fn next_needle(&self) -> usize {
         self.next
     }

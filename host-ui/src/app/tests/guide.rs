@@ -1,7 +1,8 @@
 //! The guide against the state machine of the procedure, and its figures against their state.
 
-use super::fixture::{Drawn, live, one_needle};
-use crate::panel::workflow::{MetMembranes, lesson};
+use super::fixture::{Drawn, live, many_needles, one_needle};
+use crate::action::{Action, PlanAction};
+use crate::panel::workflow::{MetMembranes, Progress, lesson, missing, next_action, progress};
 use crate::shown::{NeedleLine, Outside, Shown};
 use bytemuck::Zeroable;
 use stylet_implant::plan::Template;
@@ -185,4 +186,31 @@ fn depth_counts_from_the_template_with_a_plan_and_without() {
     let with_plan_m = shown.depth_m().expect("a depth");
     shown.plan = None;
     assert!((shown.depth_m().expect("a depth") - with_plan_m).abs() < 1e-9);
+}
+
+/// Guards against "Press Space: the seed leaves the needle" over "no membrane has opened yet", after a reset with the
+/// needle inside.
+#[test]
+fn after_a_reset_the_needle_is_taken_out_first() {
+    for depth_m in [0.03, FIRST_DROP_M] {
+        let mut shown = one_needle(depth_m, 0);
+        shown.is_free_inside = true;
+        if let Some(state) = &mut shown.state {
+            (state.flags, state.speed_m_per_s) = (flags::REAL_TIME | flags::ENGAGED, 0.0);
+        }
+        let lesson = lesson(&shown, &MetMembranes::default());
+        assert!(lesson.what.starts_with("Take the needle out first"), "{}", lesson.what);
+        let step = progress(&shown);
+        assert_eq!((step, missing(&shown, step)), (Progress::Place, None));
+        assert_eq!(next_action(&shown), Some(Action::PlaceNeedle));
+    }
+}
+
+/// Guards against "Plan five seeds" in the guide, beside a step that offers the first needle of a plan.
+#[test]
+fn a_plan_of_many_needles_begins_with_its_first() {
+    let shown = many_needles(3, 0);
+    let what = what(&shown, &MetMembranes::default());
+    assert!(what.starts_with("Press \"First needle\" in step 2"), "{what}");
+    assert_eq!(next_action(&shown), Some(Action::Plan(PlanAction::NextNeedle)));
 }

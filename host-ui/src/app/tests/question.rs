@@ -131,7 +131,7 @@ fn a_plan_replaces_no_file_of_another_case_without_an_answer() {
     // Now the file is this plan's.
     drawn.app.act(save(), &ctx);
     assert!(drawn.app.question.is_none());
-    drawn.app.workflow.plan.forget_file();
+    drawn.app.workflow.plan.forget_scene();
     drawn.app.act(save(), &ctx);
     assert!(drawn.app.question.is_some(), "of another scene");
 }

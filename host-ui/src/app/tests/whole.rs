@@ -9,6 +9,7 @@ use crate::app::App;
 use crate::app::layout::Narrow;
 use crate::panel::question::Question;
 use crate::panel::workflow::Progress;
+use crate::planner::JobProgress;
 use crate::settings::Layout;
 use crate::shown::{LoadState, Note, Shown, Watched};
 use crate::view::state::Tool;
@@ -135,6 +136,11 @@ pub const STATES: &[State] = &[
         }
         guided(app, shown);
     }),
+    ("guide after a reset", |app| {
+        let mut shown = one_needle(0.03, 0);
+        shown.is_free_inside = true;
+        guided(app, shown);
+    }),
     ("guide on the way in", |app| guided(app, one_needle(0.03, 0))),
     ("guide at a drop", |app| guided(app, one_needle(0.07, 1))),
     ("guide out", |app| guided(app, one_needle(0.03, 5))),
@@ -175,6 +181,13 @@ pub const STATES: &[State] = &[
         app.shown = many_needles(24, 0);
         app.workflow.plan.path = LONG_PATH.to_owned();
         every_banner(&mut app.shown);
+    }),
+    ("plan is compensated", |app| {
+        app.shown = many_needles(24, 0);
+        app.shown.planning.job = Some(JobProgress {
+            what: "Rehearsing needle 12 (M13), 12 of 24; about 1 h 12 min left".to_owned(),
+            share: Some(0.45),
+        });
     }),
     ("needle 2 of 19", |app| {
         app.shown = many_needles(19, 2);

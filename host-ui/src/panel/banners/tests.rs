@@ -128,12 +128,12 @@ fn a_relay_banner_shows_trainee_operator_and_delay() {
     assert_eq!(
         list.iter().map(|b| b.text.as_str()).collect::<Vec<_>>(),
         [
-            "Ina, instructor, at 192.168.1.5:7461. Élodie operates. Shown 34 ms late, round trip 3 ms; 0 records and 7 snapshots lost."
+            "Ina, instructor, at 192.168.1.5:7461. Élodie is operating. Shown 34 ms late, round trip 3 ms; 0 records and 7 snapshots lost."
         ]
     );
     line.operates = 1;
     shown.relayed = Some(line);
-    assert!(banners(&shown)[0].text.contains("You operate"));
+    assert!(banners(&shown)[0].text.contains("You are operating"));
     (line.is_heard, line.snapshot_age_ns) = (0, 2_500_000_000);
     shown.relayed = Some(line);
     shown.status = LinkStatus::Silent {

@@ -80,6 +80,9 @@ fn the_core_s_window_shows_watchers_and_decides_who_operates() {
         class.is_beside_core = 1;
     }
     let list = banners(&shown);
-    assert_eq!(list[0].text, "3 members are connected over the relay. Otto operates.");
+    assert_eq!(
+        list[0].text,
+        "3 members are connected over the relay. Otto is operating."
+    );
     assert_eq!(buttons(&shown), ["Operate from here", "Hand the needle to Olga"]);
 }

@@ -196,7 +196,7 @@ fn search_ui(ui: &mut egui::Ui, state: &mut ParametersState) {
     ui.horizontal(|ui| {
         let label = ui.label(theme::weak("Search"));
         let edit = egui::TextEdit::singleline(&mut state.search)
-            .hint_text("words of name, key, source or help")
+            .hint_text("name, key, source or help text")
             .desired_width(300.0);
         ui.add(edit).labelled_by(label.id);
         if ui.add_enabled(!state.search.is_empty(), Button::new("Clear")).clicked() {

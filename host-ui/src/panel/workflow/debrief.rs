@@ -5,7 +5,7 @@ use crate::dose_worker::{DoseOf, DoseResult, Figure};
 use crate::panel::axis::{plot, upwards};
 use crate::shown::{SeedError, Shown, all_errors};
 use crate::theme;
-use crate::words::Explained;
+use crate::words::{Explained, counted};
 use egui::RichText;
 use egui_plot::{Line, PlotPoints, VLine};
 use stylet_base::format;
@@ -49,9 +49,7 @@ pub fn dose_ui(ui: &mut egui::Ui, shown: &Shown, height: f32, otherwise: &str) {
     );
     ui.label(what).explained("source").explained("prescription");
     if shown.is_one_needle_by_hand() {
-        ui.label(theme::small(
-            "One needle is no implant: its dose has no limits to meet.",
-        ));
+        ui.label(theme::small("One needle is not an implant: no dose limits apply."));
         return;
     }
     if let Some(words) = moved_words(dose, shown.body_moved_m) {
@@ -138,7 +136,11 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
     let touch = |number: &usize| !touching(&shown.seeds, *number).is_empty();
     let touching = (0..shown.seeds.len()).filter(touch).count();
     if touching > 0 {
-        ui.label(theme::small(format!("{touching} seeds touch a neighbour")));
+        let touch = if touching == 1 { "touches" } else { "touch" };
+        ui.label(theme::small(format!(
+            "{} {touch} a neighbour",
+            counted(touching, "seed")
+        )));
     }
     for (needle, row) in rows {
         if let Some(place) = shown.outside(*needle, row) {

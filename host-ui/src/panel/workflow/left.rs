@@ -13,7 +13,7 @@ pub(super) fn leave_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Actio
     let may = shown.is_live() && !shown.running && is_in && shown.left.len() < MAX_LEFT_NEEDLES;
     let button = ui.add_enabled(may, Button::new("Leave in"));
     let help =
-        "The needle stays in place and holds the gland; move the hand out and take another one. At most 4 stay in.";
+        "The needle stays in place and holds the gland; move the hand out and take another needle. At most 4 stay in.";
     if button.on_hover_text(help).on_disabled_hover_text(help).clicked() {
         actions.push(Action::Send(Request::LeaveNeedle));
     }

@@ -221,7 +221,9 @@ fn what(step: Progress, shown: &Shown) -> String {
             let which = plan::at_work(shown).map_or_else(String::new, |text| text + " ");
             format!("{which}Bring the tip to the entry of the path.")
         }
-        Progress::Insert => "To the deepest planned seed: the button, W and S, or drag the tip in a slice.".to_owned(),
+        Progress::Insert => {
+            "Push to the deepest planned seed: the button, W and S, or drag the tip in a slice.".to_owned()
+        }
         Progress::Drop => {
             let (dropped, planned) = (shown.own_seeds().len(), shown.planned().len());
             format!("{dropped} of {planned} seeds dropped. Drop one at each place while retracting.")

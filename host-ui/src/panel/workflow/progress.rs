@@ -56,7 +56,7 @@ pub fn progress(shown: &Shown) -> Progress {
         return Progress::Plan;
     }
     // The last needle of a plan is done even if it has lost a seed.
-    if shown.planning.progress.is_done_with(shown.seeds.len()) && shown.planning.next_needle().is_none() {
+    if shown.planning.progress.is_done() && shown.planning.next_needle().is_none() {
         return Progress::Debrief;
     }
     match needle_at_hand(shown).map(|needle| needle.step()) {
@@ -78,6 +78,7 @@ pub fn needle_at_hand(shown: &Shown) -> Option<AtHand> {
     Some(AtHand {
         depth_m: if is_elsewhere { depth_m.min(0.0) } else { depth_m },
         beside_m,
+        is_free_inside: shown.is_free_inside && !is_elsewhere,
         speed_m_per_s: shown.state.map(|s| s.speed_m_per_s),
         dropped: shown.own_seeds().len(),
         deepest_drop_m: shown.deepest_seed_m(),
@@ -280,6 +281,7 @@ mod tests {
         shown.planning.progress.finish(1);
         assert_eq!(progress(&shown), Progress::Debrief);
         shown.seeds.clear();
+        shown.planning.progress.take(0);
         assert_eq!(progress(&shown), Progress::Place);
     }
 

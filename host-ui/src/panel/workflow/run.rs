@@ -93,7 +93,7 @@ fn watched_ui(ui: &mut egui::Ui, watched: &Watched, actions: &mut Vec<Action>) {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let close = ui
                 .button("Close")
-                .on_hover_text("Back to rt-core, where the needle can be moved");
+                .on_hover_text("Returns to rt-core, where you can move the needle");
             if close.clicked() {
                 asked(WatchAction::Close);
             }
@@ -142,7 +142,7 @@ fn time_line_ui(ui: &mut egui::Ui, watched: &Watched, actions: &mut Vec<Action>)
         let share = f64::from((place.x - line.left()) / line.width().max(1.0));
         actions.push(Action::Watch(WatchAction::Jump(share.clamp(0.0, 1.0) * length_s)));
     }
-    response.on_hover_text(under.unwrap_or_else(|| "Click for another time".to_owned()));
+    response.on_hover_text(under.unwrap_or_else(|| "Click to jump to another time".to_owned()));
 }
 
 fn begin_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {

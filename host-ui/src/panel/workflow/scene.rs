@@ -33,7 +33,7 @@ fn probe_solved_in(scene: &SceneHeader, edge_um: u32) -> Option<(String, String)
         let why = if is_coarse {
             format!(
                 "The pressure of the probe was solved in larger elements than the scene's cells of {cell_mm:.1} mm: in \"pelvis\" it is \
-                 10 to 15 % too strong. \"rt-core probe\" solves it in the cells once, for minutes; the next run uses that."
+                 10 to 15 % too strong. Run \"rt-core probe\" once, which takes minutes: the next start of the core uses its result."
             )
         } else {
             "The pressure of the probe is solved in the scene's own cells.".to_owned()
@@ -76,8 +76,8 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
     }
     if shown.scene.as_ref().is_some_and(|s| !has_every_label(s)) {
         ui.label(theme::small("Surfaces follow the lattice")).on_hover_text(format!(
-            "The scene has more than {} cells, so that not every label reaches the window: surfaces go through the middles of the \
-             outermost elements, half an element within the structures.",
+            "The scene has more than {} cells, so the window has no labels of them: surfaces go through the middles of the \
+             outermost elements, half an element inside the structures.",
             format::count(MAX_LABEL_CELLS as u64)
         ));
     }

@@ -121,7 +121,7 @@ impl Moment {
     /// gland of the moment.
     fn anatomy(&self, rest: &Anatomy, scene: &SceneModel, snapshot: &Snapshot) -> Result<[Anatomy; 2], Failure> {
         let field =
-            Field::of(scene.header.nodes, &snapshot.displacements_m).ok_or("the state of the tissue is unknown")?;
+            Field::of(scene.header.nodes, &snapshot.displacements_m).ok_or("The state of the tissue is unknown.")?;
         let to_m = |p: [f64; 3]| {
             let rest = Vector3::from(p);
             <[f64; 3]>::from(rest + field.displacement_m(rest))

@@ -264,7 +264,7 @@ impl Planner {
         let found = match review.assessing.as_ref().map(|(_, job)| job.poll()) {
             None | Some(JobUpdate::Pending) => return,
             Some(JobUpdate::Message(found)) => found,
-            Some(JobUpdate::Ended) => Err("the dose could not be computed".to_owned()),
+            Some(JobUpdate::Ended) => Err("The dose could not be computed.".to_owned()),
         };
         let moment = review.assessing.take().map(|(moment, _)| moment);
         match found {
@@ -299,7 +299,7 @@ impl Planner {
         let (scene, snapshot) = (scene.clone(), snapshot.clone());
         self.review.shown.update = None;
         self.begin_job("Replanning the remaining needles", move |_, outlines| {
-            let moment = moment.ok_or("contour the gland in three planes first, with a seed in the tissue")?;
+            let moment = moment.ok_or("Contour the gland in three planes first, with a seed in the tissue.")?;
             Ok(move |reporter: &Reporter<'_>| {
                 let report = |share| reporter.report(share);
                 let found = moment.update(&outlines.anatomy, &scene, &snapshot, &report)?;

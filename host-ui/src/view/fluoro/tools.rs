@@ -11,12 +11,12 @@ impl FluoroView {
     /// Draws the switch, the angles, and the button for another patient.
     pub fn tools_ui(&mut self, ui: &mut egui::Ui) {
         let beam = ui.toggle_value(&mut self.is_switched_on, "X-ray");
-        beam.on_hover_text("Key X while held: 8 pulses a second; afterwards the last image is held");
+        beam.on_hover_text("Hold X: 8 pulses a second. The last image stays on the screen.");
         let hint = "Ctrl with left, right: turns the detector to the patient's left or right";
         angle_ui(ui, "Orbital", ORBITAL_DEG, hint, &mut self.angles.orbital);
         let hint = "Ctrl with up, down: tilts the detector towards the head or feet";
         angle_ui(ui, "Cranial", CRANIAL_DEG, hint, &mut self.angles.cranial);
-        let hint = "Sets the dose to zero and clears the screen; another scene does so too";
+        let hint = "Sets the dose to zero and clears the screen, as a new scene does";
         if Press("New case", hint).ui(ui, true) {
             self.begin_case();
         }

@@ -4,7 +4,6 @@
 mod gpu;
 mod overlay;
 mod plane;
-mod polyline;
 mod speckle;
 
 use super::body::ShownBody;
@@ -225,7 +224,7 @@ impl Slices {
             self.zoom = (self.zoom * f64::from(pinch)).clamp(ZOOMS[0], ZOOMS[1]);
         } else if scroll != 0.0 {
             let normal = self.plane(orientation, view, rect).normal();
-            view.follow_tip = false;
+            view.leave_tip();
             view.cursor_m += normal * f64::from(scroll) * M_PER_SCROLLED_POINT;
         }
     }
@@ -254,7 +253,7 @@ impl Slices {
         if response.clicked() && view.measure.active {
             view.measure.take(plane.in_scene(place));
         } else if !view.measure.active && (response.clicked() || response.dragged_by(PointerButton::Primary)) {
-            view.follow_tip = false;
+            view.leave_tip();
             view.cursor_m = plane.in_scene(place);
         }
         None
@@ -266,15 +265,7 @@ fn tissue_at(body: &ShownBody, place_m: Vector3<f64>) -> String {
     let Some(model) = &body.model else {
         return String::new();
     };
-    let (grid, rest_m) = (&model.header.labels, body.field.rest_of_m(place_m));
-    let cell = [0, 1, 2].map(|a| ((rest_m[a] - grid.origin_m[a]) / grid.spacing_m).round());
-    let dims = grid.dims.map(f64::from);
-    if (0..3).any(|a| !(0.0..dims[a]).contains(&cell[a])) {
-        return String::new();
-    }
-    let [x, y, z] = cell.map(|c| c as usize);
-    let n = (z * grid.dims[1] as usize + y) * grid.dims[0] as usize + x;
-    let number = model.labels.get(n).map_or(0, |&label| usize::from(label));
+    let number = usize::from(model.label_at(body.field.rest_of_m(place_m).into()));
     let structure = number.checked_sub(1).and_then(|s| model.header.structures().get(s));
     structure.map_or_else(String::new, |s| s.name.read())
 }

@@ -41,7 +41,7 @@ pub enum StepFailure {
 fn advice(waits_for: &WaitsFor) -> &'static str {
     match waits_for {
         WaitsFor::Line => {
-            "; rt-core prepares that beside its loops, so give it a processor, or run with --tissue chainmail"
+            "; rt-core prepares it in the background: leave it a free processor, or run with --tissue chainmail"
         }
         _ => "",
     }

@@ -25,10 +25,13 @@ fn placed_seeds_determine_the_continuation() {
     let rest = found(&three, Some([0.01, 0.0, 0.05]));
     assert_eq!((rest.is_partial(), rest.next_needle()), (true, 1));
     assert_eq!([0, 1].map(|n| rest.seeds_of(n)), [2, 1]);
+    assert!(rest.is_begun(1) && !found(&three[..2], None).is_begun(1));
     // All seeds of the first, and it is still in the tissue.
     assert_eq!(found(&three[..2], Some([0.0, 0.0, 0.03])).next_needle(), 0);
     let all = [&three[..], &[[0.01, 0.0, 0.04]]].concat();
-    assert!(!found(&all, Some([0.0, 0.0, -0.01])).is_partial(), "nothing is left");
+    let whole = found(&all, Some([0.0, 0.0, -0.01]));
+    assert!(!whole.is_partial(), "nothing is left");
+    assert_eq!((whole.has_begun(), whole.next_needle()), (true, 2));
     assert!(found(&all, Some([0.01, 0.0, 0.03])).is_partial(), "but to take it out");
     // A drop that left no seed is not repeated.
     let lost = Placed::find(&tasks, &three[1..], None, &[0]);

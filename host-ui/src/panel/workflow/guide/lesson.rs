@@ -18,6 +18,8 @@ pub struct Lesson {
 
 /// Force below which zero is shown.
 const LEAST_N: f64 = 5e-3;
+/// Motion below which zero is shown, m.
+const LEAST_M: f64 = 0.05e-3;
 /// Number of seeds with a line of their own.
 const SEEDS: usize = 6;
 
@@ -65,6 +67,14 @@ fn next_lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
             "Choose a scene: press \"paper\" in step 1. It is a gland without other organs.",
             &[],
         ),
+        (Progress::Plan, _) if shown.planning.next_needle().is_some() => of(
+            "Press \"First needle\" in step 2, or Enter. Enter always does what comes next.",
+            &["Rings in the pictures show where the seeds should come to rest."],
+        ),
+        (Progress::Plan, _) if shown.planning.implant.is_some() => of(
+            "Choose a hole in the template at the right, and press Enter there to add a needle.",
+            &["\"Automatic plan\" in step 2 places all needles and seeds for you."],
+        ),
         (Progress::Plan, _) => of(
             "Press \"Plan five seeds\" in step 2, or Enter. Enter always does what comes next.",
             &["Rings in the pictures show where the seeds should come to rest."],
@@ -75,7 +85,7 @@ fn next_lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
             let outside = shown.last_outside();
             lesson
                 .notes
-                .extend(outside.map(|place| format!("The last seed was {place}. Ctrl+Z takes it back.")));
+                .extend(outside.map(|place| format!("The last seed was {place}. Ctrl+Z undoes it.")));
             lesson
         }
         (_, None) => of("Press Enter for the next needle.", &[]),
@@ -114,6 +124,12 @@ fn operation_lesson(shown: &Shown, membranes: &MetMembranes, needle: &AtHand, op
 }
 
 fn place(shown: &Shown) -> Lesson {
+    if shown.is_free_inside {
+        return of(
+            "Take the needle out first: press Enter. With a device, draw it back by hand.",
+            &["After a reset the needle meets no tissue until its tip has been outside the body."],
+        );
+    }
     if !shown.is_engaged() {
         return of(
             "Press E to turn the force on. Without it no force is rendered, and every force reads 0.",
@@ -135,7 +151,7 @@ fn insert(shown: &Shown, membranes: &MetMembranes, needle: &AtHand) -> Lesson {
             format!(" Waited {wait}.")
         };
         return of(
-            format!("Wait here until LINE READY stands in the bar at the top.{so_far}"),
+            format!("Wait here until LINE READY appears in the bar at the top.{so_far}"),
             &[],
         );
     }
@@ -237,17 +253,19 @@ impl Moved {
     }
 }
 
-impl std::fmt::Display for Moved {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // Ways that go against each other would cancel out in a mean.
-        match self.mean_m.abs() > 0.9 * self.size_m {
-            true => write!(f, "{} mm on average", format::signed_mm(self.mean_m)),
-            false => write!(
-                f,
-                "{} on average, some deeper and some shallower",
-                format::length(self.size_m)
-            ),
+impl Moved {
+    /// Says how far and which way, with a word for inwards and one for outwards.
+    fn words(&self, inwards: &str, outwards: &str) -> String {
+        let far = format::length(self.size_m);
+        if self.size_m < LEAST_M {
+            return format!("{far} off plan on average");
         }
+        // Ways that go against each other would cancel out in a mean.
+        if self.mean_m.abs() <= 0.9 * self.size_m {
+            return format!("{far} on average, some {inwards} and some {outwards}");
+        }
+        let way = if self.mean_m > 0.0 { inwards } else { outwards };
+        format!("{far} {way} on average")
     }
 }
 
@@ -291,14 +309,16 @@ fn debrief(shown: &Shown, membranes: &MetMembranes) -> Lesson {
             seed.outside.map_or_else(String::new, |place| format!("; {place}"))
         )
     }));
-    notes.push(match by_tissue.size_m >= by_hand.size_m {
+    let is_of_tissue = by_tissue.size_m >= by_hand.size_m;
+    let by_tissue = by_tissue.words("deeper", "shallower");
+    let by_hand = by_hand.words("too deep", "too shallow");
+    notes.push(match is_of_tissue {
         true => format!(
-            "Most of the error comes from the tissue: as the needle left, it went back and carried the seeds {by_tissue}. \
-             The hand dropped them {by_hand} from their planned places."
+            "Most of the error comes from the tissue: as the needle left, it recoiled and carried the seeds {by_tissue}. \
+             The hand dropped them {by_hand}."
         ),
         false => format!(
-            "Most of the error comes from the hand: it dropped the seeds {by_hand} from their planned places. The tissue \
-             carried them {by_tissue}."
+            "Most of the error comes from the hand: it dropped the seeds {by_hand}. The tissue carried them {by_tissue}."
         ),
     });
     notes.push(
@@ -335,8 +355,9 @@ mod tests {
 
     #[test]
     fn motions_that_cancel_are_not_averaged_away() {
-        let said = |ways_mm: [f64; 5]| Moved::of(ways_mm.iter().map(|mm| mm * 1e-3)).to_string();
-        assert_eq!(said([2.0, 4.0, 3.0, 3.0, 3.0]), "+3.00 mm on average");
+        let said = |ways_mm: [f64; 5]| Moved::of(ways_mm.iter().map(|mm| mm * 1e-3)).words("deeper", "shallower");
+        assert_eq!(said([2.0, 4.0, 3.0, 3.0, 3.0]), "3.0 mm deeper on average");
+        assert_eq!(said([-2.0, -4.0, -3.0, -3.0, -3.0]), "3.0 mm shallower on average");
         assert_eq!(
             said([-5.6, -3.2, -0.7, 1.7, 4.2]),
             "3.1 mm on average, some deeper and some shallower"

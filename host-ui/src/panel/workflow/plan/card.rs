@@ -75,7 +75,7 @@ fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, a
                 .is_none()
                 .then(|| "add a needle with seeds first".to_owned());
             let first = ui.add_enabled(free && blocked.is_none(), Button::new("First needle"));
-            let hint = "Enter: the plan is good, begin with its first needle";
+            let hint = "Enter: accept the plan and begin with its first needle";
             if hinted(first, blocked).on_hover_text(hint).clicked() {
                 actions.push(Action::Plan(PlanAction::NextNeedle));
             }
@@ -85,7 +85,7 @@ fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, a
         // The path of a needle in the tissue is needed to take it out.
         let outside = shown.is_in_tissue().then(|| "take the needle out first".to_owned());
         let discard = ui.add_enabled(free && outside.is_none(), Button::new("Discard the plan"));
-        let hint = "Back to one needle; Ctrl+Z restores it";
+        let hint = "Returns to one needle; Ctrl+Z restores the plan";
         if hinted(discard, outside).on_hover_text(hint).clicked() {
             actions.push(Action::Plan(PlanAction::Discard));
         }
@@ -134,7 +134,7 @@ fn compensated_ui(ui: &mut egui::Ui, implant: &Implant) {
 fn strength_ui(ui: &mut egui::Ui, implant: &Implant, free: bool, actions: &mut Vec<Action>) {
     let Some(first) = implant.seeds.first() else { return };
     ui.horizontal(|ui| {
-        let label = ui.label(theme::small("Every seed"));
+        let label = ui.label(theme::small("Each seed"));
         let mut strength_u = first.strength_u;
         let value = DragValue::new(&mut strength_u)
             .range(STRENGTHS_U[0]..=STRENGTHS_U[1])
@@ -149,7 +149,7 @@ fn strength_ui(ui: &mut egui::Ui, implant: &Implant, free: bool, actions: &mut V
         }
         let fit = Press(
             "Fit dose",
-            "The strength at which 96 % of the target gets the prescription",
+            "The strength at which 96 % of the target receives the prescription",
         )
         .ui(ui, free);
         actions.extend(fit.then_some(Action::Plan(PlanAction::FitStrength)));
@@ -182,7 +182,7 @@ fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bo
         let field = path_ui(ui, "plan file", &mut state.plan.path, "plan file", width);
         let name = || "Plan file: .toml, .csv or .dcm";
         theme::named(&field, egui::accesskit::Role::TextInput, name);
-        let field = field.on_hover_text(".toml holds all of a plan; .csv and .dcm (RT Plan) its seeds");
+        let field = field.on_hover_text(".toml holds the whole plan; .csv and .dcm (RT Plan) hold its seeds");
         let path = state.plan.path.trim();
         let has_name = free && !path.is_empty();
         let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
@@ -203,8 +203,8 @@ fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bo
 
 /// Draws the export of structure set, plan and dose.
 fn study_ui(ui: &mut egui::Ui, free: bool, actions: &mut Vec<Action>) {
-    let hint = "Structure set, plan and dose that name each other, into a new folder; patient and frame are those of the scene's \
-                file where it is DICOM";
+    let hint = "RT Structure Set, RT Plan and RT Dose that reference each other, in a new folder; patient and frame of reference \
+                come from the scene's file if that is DICOM";
     let response = Press("Save as DICOM study", hint).ui(ui, free);
     actions.extend(response.then_some(Action::Plan(PlanAction::ExportStudy)));
 }

@@ -48,9 +48,9 @@ impl Default for PlanState {
 }
 
 impl PlanState {
-    /// Forgets the file of the scene before.
-    pub fn forget_file(&mut self) {
-        (self.path, self.own_file) = (String::new(), None);
+    /// Forgets file, needle and depth of the scene before.
+    pub fn forget_scene(&mut self) {
+        *self = Self::default();
     }
 }
 

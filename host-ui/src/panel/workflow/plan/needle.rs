@@ -38,24 +38,24 @@ pub fn needle_ui(
 
 fn empty_ui(ui: &mut egui::Ui, shown: &Shown, state: &PlanState, actions: &mut Vec<Action>) {
     let outlines = shown.planning.outlines.as_ref();
-    let piece_m = outlines.and_then(|g| g.piece_m(state.hole));
+    let piece_m = outlines.map(|g| g.piece_m(state.hole));
     ui.horizontal(|ui| {
         ui.label(theme::strong(format!("Hole {}", state.hole)))
             .explained("hole")
             .explained("template");
-        let add = ui.add_enabled(piece_m.is_some(), Button::new("Add needle"));
-        let add = add.on_disabled_hover_text("It would miss the target");
+        let add = ui.add_enabled(matches!(piece_m, Some(Ok(_))), Button::new("Add needle"));
         if add.on_hover_text("Enter in the template").clicked() {
             actions.push(Action::Plan(PlanAction::Add(state.hole)));
         }
     });
     let text = match piece_m {
-        Some([from, to]) => format!(
+        None => "The outlines of the scene are being computed.".to_owned(),
+        Some(Ok([from, to])) => format!(
             "The target lies {:.0} to {:.0} mm deep here.",
             format::mm(from),
             format::mm(to)
         ),
-        None => "A needle through this hole misses the target.".to_owned(),
+        Some(Err(why)) => format!("A needle through this hole {why}."),
     };
     ui.label(theme::small(text));
     // As high as with a needle, so that the list does not jump.
@@ -122,7 +122,7 @@ fn row_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, actions: &mut Vec
         let strength = DragValue::new(&mut row.strength_u)
             .range(STRENGTHS_U[0]..=STRENGTHS_U[1])
             .speed(0.005)
-            .max_decimals(3)
+            .fixed_decimals(3)
             .suffix(" U");
         labelled(ui, "of", strength);
     });

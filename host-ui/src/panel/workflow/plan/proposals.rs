@@ -37,7 +37,7 @@ pub fn proposals_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut 
     picture_ui(ui, proposals, chosen);
     let text = match chosen.and_then(|number| proposals.get(number)) {
         Some(proposal) => words(proposal),
-        None => "Changed since; a button restores a proposal.".to_owned(),
+        None => "Edited since; a button restores a proposal.".to_owned(),
     };
     super::weak_line(ui, text);
 }
@@ -48,7 +48,9 @@ fn picture_ui(ui: &mut egui::Ui, proposals: &[FirstPlan], chosen: Option<usize>)
     ui.horizontal(|ui| {
         ui.label(RichText::new("% of trials meeting D90").color(tokens.depth).size(11.5));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.label(RichText::new("over V150, %").color(tokens.weak).size(11.5));
+            let limit = format!("limit {MOST_V150:.0}");
+            ui.label(RichText::new(limit).color(tokens.bad).size(11.5));
+            ui.label(RichText::new("over V150, %;").color(tokens.weak).size(11.5));
         });
     });
     plot("proposals", HEIGHT)

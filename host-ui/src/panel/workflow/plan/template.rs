@@ -6,6 +6,7 @@ use crate::planner::{Implant, NeedleState, Outline};
 use crate::shown::Shown;
 use crate::theme;
 use crate::theme::Tokens;
+use crate::view::kinds::Kind;
 use egui::{
     Align2, Color32, EventFilter, FontId, Key, Modifiers, Painter, Pos2, Rect, Response, Sense, Shape, Stroke, Vec2,
 };
@@ -53,8 +54,14 @@ pub fn template_ui(
         let middle_m = (outlines.depths_m[0] + outlines.depths_m[1]) / 2.0;
         let depth_m = *state.depth_m.get_or_insert(middle_m);
         let layer = outlines.layer(depth_m);
-        look.outlines(&layer.spared, look.tokens.spared, 1.2);
-        look.outlines(&layer.target, look.tokens.gland, 2.0);
+        for (number, outline) in &layer.spared {
+            let body = outlines.anatomy.spared.get(*number);
+            let kind = body.map_or(Kind::Spared, |body| Kind::of_spared(&body.name));
+            look.outline(outline, kind.panel_color(look.tokens), 1.2);
+        }
+        for outline in &layer.target {
+            look.outline(outline, Kind::Gland.panel_color(look.tokens), 2.0);
+        }
     }
     look.letters();
     look.holes(implant);
@@ -224,12 +231,10 @@ impl Look<'_> {
         );
     }
 
-    fn outlines(&self, outlines: &[Outline], color: Color32, width: f32) {
+    fn outline(&self, outline: &Outline, color: Color32, width: f32) {
         let inside = self.painter.with_clip_rect(self.board.rect);
-        for outline in outlines {
-            let points = outline.iter().map(|p| self.board.place(*p)).collect();
-            inside.add(Shape::line(points, Stroke::new(width, color)));
-        }
+        let points = outline.iter().map(|p| self.board.place(*p)).collect();
+        inside.add(Shape::line(points, Stroke::new(width, color)));
     }
 
     fn letters(&self) {
