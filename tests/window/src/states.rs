@@ -138,7 +138,7 @@ fn the_whole_procedure_by_one_key_ends_in_a_debrief() {
         app.link().state().is_some_and(|s| s.flags & flags::ENGAGED != 0)
     });
     procedure_by_enter(&mut driven);
-    driven.window.get_by_label_contains("One needle is no implant");
+    driven.window.get_by_label_contains("One needle is not an implant");
     driven.window.get_by_label_contains("seeds of I-125 6711");
     assert_in_place(&mut driven, "debrief, dark");
     let picture = driven.picture("debrief");

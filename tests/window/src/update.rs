@@ -148,7 +148,7 @@ fn an_update_on_the_live_picture_is_in_the_debrief() {
         let review = app.planner().planning().review;
         review.doses.is_some() && review.marks.without_mark() == 0 && review.marks.of_seeds.len() == 6
     });
-    driven.window.get_by_label_contains("Marks off their seeds, mm");
+    driven.window.get_by_label_contains("From mark to seed, mm");
     driven.click("as marked");
     driven.click("actual positions");
 
@@ -265,7 +265,7 @@ fn debrief_says_so(driven: &mut Driven) {
     };
     let folder = std::path::PathBuf::from(said.trim_start_matches("Debrief saved as "));
     let page = std::fs::read_to_string(folder.join("debrief.html")).expect("a page");
-    assert!(page.contains("Updates of the plan") && page.contains("Update 1, taken"));
+    assert!(page.contains("Updates of the plan") && page.contains("Update 1, accepted"));
     let json = std::fs::read_to_string(folder.join("score.json")).expect("figures");
     let score: serde_json::Value = serde_json::from_str(&json).expect("JSON");
     let d90 = |which: &str| {

@@ -159,7 +159,7 @@ fn an_update_is_in_the_debrief_with_its_contour_error() {
     let page = page::page(&score).expect("drawn");
     for words in [
         "Dice 0.931, surfaces 0.81 mm apart on average and 3.2 mm at most, 38.2 cc of 40.1 cc",
-        "Update 1, taken",
+        "Update 1, accepted",
         "19 seeds were marked, 1.2 mm off on average and 3.9 mm at most; marks of no seed: 1",
         "8 needles with 30 seeds remained, 7 with 28 in the update",
     ] {

@@ -4,6 +4,7 @@
 mod gpu;
 mod overlay;
 mod plane;
+mod polyline;
 mod speckle;
 
 use super::body::ShownBody;

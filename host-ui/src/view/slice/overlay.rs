@@ -2,6 +2,7 @@
 
 use super::Contour;
 use super::plane::Plane;
+use super::polyline::simplified;
 use crate::dose_worker::{DoseOf, DoseResult, LEVELS};
 use crate::shown::Shown;
 use crate::theme::IMAGE;
@@ -143,7 +144,7 @@ impl Overlay<'_> {
     fn points(&self, line: &cut::Line, shift_m: [f64; 3]) -> Vec<Pos2> {
         let shift = Vector3::from(shift_m);
         let place = |p: &[f32; 3]| self.plane.on_screen(Vector3::from(*p).map(f64::from) + shift);
-        line.iter().map(place).collect()
+        simplified(line.iter().map(place))
     }
 
     fn isodose(&self, level: usize, line: &cut::Line, shift_m: [f64; 3]) {
