@@ -156,12 +156,12 @@ python: ## Build the Python package, a wheel for Python 3.9 or newer, into targe
 	python3 -m venv $(PYTHON)/maturin && $(PYTHON)/maturin/bin/pip install -q maturin==1.16.0
 	cd rt-core/python && CARGO_TARGET_DIR=$(PYTHON) $(PYTHON)/maturin/bin/maturin build --release --locked --out $(WHEELS)
 
-python-test: python ## Install the wheel in a fresh environment, test it beside the same in Rust, dicompyler-core and pymedphys, and run the notebooks (some minutes)
+python-test: python products ## Install the wheel in a fresh environment, compare it with the same in Rust, the programs and other packages, and run the notebooks (some minutes)
 	python3 -m venv --clear $(PYTHON)/test
 	$(PYTHON)/test/bin/pip install -q -r rt-core/python/tests/requirements.txt
 	$(PYTHON)/test/bin/pip install -q --no-deps $(WHEELS)/stylet-*.whl
 	cd rt-core/python && CARGO_TARGET_DIR=$(PYTHON) $(CARGO) run --quiet --release --locked --example steps >$(PYTHON)/steps
-	cd rt-core/python && STYLET_STEPS=$(PYTHON)/steps $(PYTHON)/test/bin/python -m pytest -s
+	cd rt-core/python && STYLET_STEPS=$(PYTHON)/steps STYLET_PROGRAMS=$(abspath $(BIN)) $(PYTHON)/test/bin/python -m pytest -s
 
 attributes: ## Read 10,000 objects of each kind with damaged attributes; a wrong figure without a note fails
 	STYLET_ATTRIBUTES=$(or $(OBJECTS),10000) $(CARGO) test --profile quick -p stylet-files --lib damaged_attributes -- --nocapture

@@ -10,6 +10,7 @@ mod files;
 mod insertion;
 mod needle;
 mod parameters;
+mod recordings;
 mod scene;
 mod sources;
 mod stage;
@@ -32,6 +33,8 @@ mod _stylet {
     use super::insertion::{Insertion, State};
     #[pymodule_export]
     use super::parameters::{Parameter, parameters, tissues};
+    #[pymodule_export]
+    use super::recordings::{read_flight, read_recording};
     #[pymodule_export]
     use super::scene::{Scene, Structure, scenes};
     #[pymodule_export]

@@ -1,6 +1,7 @@
 """Rehearsals and studies: the bits of the programs."""
 
 import os
+import pathlib
 import subprocess
 import tomllib
 
@@ -53,9 +54,9 @@ def test_the_digest_is_that_of_any_threads_and_of_the_program(study, tmp_path):
     assert one["digest"] == two["digest"] and len(one["digest"]) == 64
     assert one["digest"] == stylet.study(study, tmp_path / "one")["digest"], "what is there is not run again"
     assert set(one["insertions"]["insert_mm_per_s"]) and len(set(one["insertions"]["insert_mm_per_s"])) == 4
-    program = os.environ.get("STYLET_STUDY")
-    if program is not None:
-        command = [program, "study", study, "--out", tmp_path / "program"]
+    programs = pathlib.Path(os.environ.get("STYLET_PROGRAMS", ""))
+    if (programs / "rt-core").exists():
+        command = [programs / "rt-core", "study", study, "--out", tmp_path / "program"]
         said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
         assert one["digest"] in said, said
 

@@ -3,7 +3,6 @@
 use super::inbox::Inbox;
 use super::second;
 use super::thread::lock;
-use super::{SceneModel, Snapshot};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -11,46 +10,11 @@ use stylet_shm_schema::{
     Event, EventKind, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord,
 };
 
+pub use stylet_recordings::{Piece, Played};
+
 const PASS: Duration = Duration::from_millis(4);
 /// Interval of the heartbeat, without which the host would consider the core silent while the recording is paused.
 const BEAT: Duration = Duration::from_millis(20);
-
-/// A recorded message of the core.
-pub enum Piece {
-    /// A tick of the force loop.
-    Tick(Box<TickRecord>),
-    /// An event.
-    Event(Box<Event>),
-    /// A tick of the second device's loop.
-    Second(Box<SecondRecord>),
-    /// Fields of the state that ticks do not hold.
-    State(Box<HapticState>),
-    /// Scene from now on.
-    Scene(Arc<SceneModel>),
-    /// Plan from now on.
-    Plan(Box<PlanInForce>),
-    /// Parameters from now on.
-    Parameters(Box<ParametersInForce>),
-    /// Snapshot of the tissue.
-    Snapshot(Box<Snapshot>),
-}
-
-/// The first run of the core in a recording.
-pub struct Played {
-    /// Announcement of the core, as far as recorded.
-    pub session: Session,
-    /// Messages in time order, ns since the first.
-    pub pieces: Vec<(u64, Piece)>,
-    /// Why reading ended before the end of the file, if it did.
-    pub cut_off: Option<String>,
-}
-
-impl Played {
-    /// Duration, ns.
-    pub fn length_ns(&self) -> u64 {
-        self.pieces.last().map_or(0, |(time_ns, _)| *time_ns)
-    }
-}
 
 /// Event of a recording on its time line.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,10 +1,10 @@
 //! Errors of recording a session and of using a recording.
 
 use crate::link::LinkError;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use stylet_base::WriteError;
-use stylet_base::input::InputError;
 use stylet_base::interrupt::InterruptError;
+use stylet_recordings::{FileProblem, RecordingError};
 use stylet_shm_schema::Refusal;
 
 /// Failure to record a session or to use a recording; each text says what to do if there is a remedy.
@@ -47,13 +47,8 @@ pub enum RecordError {
         events: u64,
     },
     /// A file cannot be created, read or written.
-    #[error("{}: {why}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Problem with the file.
-        why: FileProblem,
-    },
+    #[error(transparent)]
+    File(#[from] RecordingError),
     /// The program that serves viewers cannot be started.
     #[error("stylet-live: cannot be started ({0}): 'make live' builds it; it belongs beside host-ui")]
     NoLive(std::io::Error),
@@ -68,52 +63,9 @@ pub enum RecordError {
     Write(#[from] WriteError),
 }
 
-/// Problem with the file of a recording.
-#[derive(Debug, thiserror::Error)]
-pub enum FileProblem {
-    /// It cannot be created.
-    #[error("{0}; choose another file with --out")]
-    Create(std::io::Error),
-    /// It cannot be read at all.
-    #[error(transparent)]
-    Io(std::io::Error),
-    /// It cannot be read to be shown.
-    #[error(transparent)]
-    Read(#[from] InputError),
-    /// It cannot be written.
-    #[error(transparent)]
-    Write(#[from] mcap::McapError),
-    /// It is not a recording.
-    #[error(transparent)]
-    Show(#[from] ShowError),
-    /// It holds no tick.
-    #[error("holds no tick of Stylet")]
-    NoTick,
-    /// It holds no tick of a second device.
-    #[error("the recording holds no tick of a second device: it is of a run without --device-2")]
-    NoSecond,
-}
-
-/// Reason why the bytes of a recording cannot be shown; the text follows the name of the file.
-#[derive(Debug, thiserror::Error)]
-pub enum ShowError {
-    /// Another kind of file.
-    #[error("it is no recording of host-ui record (not an MCAP file)")]
-    NotMcap,
-    /// An earlier version recorded it.
-    #[error("it holds no scene: an earlier version recorded it; record it again to look at it")]
-    NoScene,
-    /// Nothing usable precedes the damage.
-    #[error("{0}")]
-    Damaged(String),
-}
-
 impl RecordError {
     /// Returns an error about a file, which it names.
     pub(super) fn of_file(path: &Path, why: impl Into<FileProblem>) -> Self {
-        Self::File {
-            path: path.to_owned(),
-            why: why.into(),
-        }
+        RecordingError::new(path, why).into()
     }
 }

@@ -1,11 +1,11 @@
 //! Exports of a recording: a table, and a motion for the core's replay device.
 
-use super::error::{FileProblem, RecordError};
-use super::read::read;
+use super::error::RecordError;
 use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stylet_base::{write_streamed, write_whole};
+use stylet_recordings::{FileProblem, read};
 use stylet_shm_schema::motion::{Motion, MotionSample};
 use stylet_shm_schema::{SecondRecord, TickRecord};
 

@@ -5,30 +5,23 @@
 //! (72 MB, `link`), and 12 s of them while the program is suspended (`service::RECORD_BUFFER`). Any loss is counted and
 //! listed for each kind of message.
 
-mod channels;
 mod error;
 mod export;
-mod gaps;
 mod live;
-mod messages;
-mod played;
-mod read;
-mod stream;
 mod writer;
 
-pub use error::{FileProblem, RecordError, ShowError};
+pub use error::RecordError;
 pub use export::{Export, export};
-pub use gaps::{Gap, Gaps};
-pub use played::{played, played_of};
-pub use read::{Recording, read};
+pub use stylet_recordings::{FileProblem, Gap, Gaps, ShowError, played_of, read};
 
 use crate::link::{Link, LinkError, LinkStatus};
 use clap::Args;
 use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
+use stylet_recordings::Played;
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::Request;
 use writer::{Totals, Writer};
@@ -61,6 +54,11 @@ pub struct Options {
     /// while it rests, and 17 while the gland is undisturbed
     #[arg(long, default_value_t = 20.0, value_name = "HZ")]
     snapshot_rate: f64,
+}
+
+/// Reads a recording for a window; refuses one without a scene.
+pub fn played(path: &Path, interrupt: &Interrupt) -> Result<Played, RecordError> {
+    Ok(stylet_recordings::played(path, interrupt)?)
 }
 
 /// Records until the time is up or it is interrupted; fails if a tick was lost on the way.

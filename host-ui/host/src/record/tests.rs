@@ -288,7 +288,8 @@ fn a_recording_is_played_as_a_core_speaks() {
 /// example, had fewer.
 #[test]
 fn messages_of_the_example_are_written_again_in_the_same_digits() {
-    use super::channels::Kind;
+    use stylet_recordings::channels::Kind;
+    use stylet_recordings::{messages, stream};
     let bytes = std::fs::read("../example/insertion.mcap").unwrap();
     let mut counts = [0; 4];
     stream::each(&bytes, |topic, _, data| {

@@ -1,9 +1,5 @@
 //! Encodes and writes messages, and counts what is lost.
 
-use super::channels::{CHANNELS, Kind};
-use super::gaps::{Gap, Gaps};
-use super::messages;
-use crate::link::{SceneModel, Snapshot};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use serde::Serialize;
@@ -11,6 +7,8 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Seek, Write};
 use std::process::ChildStdin;
+use stylet_recordings::channels::{CHANNELS, Kind};
+use stylet_recordings::{Gap, Gaps, SceneModel, Snapshot, messages};
 use stylet_shm_schema::affinity::now_ns;
 use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord};
 

@@ -19,6 +19,8 @@ __all__ = [
     "Parameter",
     "parameters",
     "tissues",
+    "read_flight",
+    "read_recording",
     "Scene",
     "Structure",
     "scenes",
@@ -70,6 +72,92 @@ class _Dose(TypedDict):
     origin_mm: list[float]
     spacing_mm: list[float]
     notes: list[str]
+
+class _Ticks(TypedDict):
+    time_s: NDArray[np.float64]
+    tick: NDArray[np.uint64]
+    tip_mm: NDArray[np.float64]
+    deflection_mm: NDArray[np.float64]
+    tool: NDArray[np.float64]
+    force_n: NDArray[np.float64]
+    terms_n: NDArray[np.float64]
+    past_membrane_mm: NDArray[np.float64]
+    speed_mm_per_s: NDArray[np.float64]
+    phase: NDArray[np.uint8]
+    fault: NDArray[np.uint32]
+    flags: NDArray[np.uint32]
+    buttons: NDArray[np.uint32]
+    tissue_tick: NDArray[np.uint64]
+    missed: NDArray[np.uint32]
+    wake_latency_ns: NDArray[np.uint64]
+    force_written_ns: NDArray[np.uint64]
+    work_ns: NDArray[np.uint64]
+
+class _SecondTicks(TypedDict):
+    time_s: NDArray[np.float64]
+    tick: NDArray[np.uint64]
+    tip_mm: NDArray[np.float64]
+    tool: NDArray[np.float64]
+    force_n: NDArray[np.float64]
+    torque_nm: NDArray[np.float64]
+    contact_n: NDArray[np.float64]
+    fault: NDArray[np.uint32]
+    flags: NDArray[np.uint32]
+    buttons: NDArray[np.uint32]
+    tissue_tick: NDArray[np.uint64]
+    missed: NDArray[np.uint32]
+    wake_latency_ns: NDArray[np.uint64]
+    force_written_ns: NDArray[np.uint64]
+    work_ns: NDArray[np.uint64]
+
+class _Events(TypedDict):
+    kind: list[str]
+    text: list[str]
+    time_s: NDArray[np.float64]
+    tick: NDArray[np.uint64]
+    code: NDArray[np.uint32]
+    value: NDArray[np.float64]
+    position_mm: NDArray[np.float64]
+
+class _Snapshots(TypedDict):
+    time_s: NDArray[np.float64]
+    displacement_mm: NDArray[np.float64]
+    seeds: NDArray[np.uint32]
+    tip_mm: NDArray[np.float64]
+    surface_mm: NDArray[np.float32]
+    rest_mm: NDArray[np.float32]
+    triangles: NDArray[np.uint32]
+
+class _Recording(TypedDict):
+    device: str
+    version: str
+    scene: str
+    cut_off: str | None
+    ticks: _Ticks
+    second: _SecondTicks
+    events: _Events
+    snapshots: _Snapshots
+    seeds_mm: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    planned_mm: NDArray[np.float64]
+    parameters: dict[str, float]
+
+class _TissueTicks(TypedDict):
+    time_s: NDArray[np.float64]
+    tip_mm: NDArray[np.float64]
+    displacement_mm: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    seeds: NDArray[np.uint32]
+
+class _Flight(TypedDict):
+    reason: str
+    device: str
+    version: str
+    period_s: float
+    tissue_period_s: float
+    ticks: _Ticks
+    second: _SecondTicks
+    tissue: _TissueTicks
 
 @final
 class Parameter:
@@ -312,3 +400,5 @@ def study(file: _Path, folder: _Path, *, jobs: int | None = None) -> _Study: ...
 def read_labels(path: _Path) -> _Labels: ...
 def read_plan(path: _Path) -> _Plan: ...
 def read_dose(path: _Path) -> _Dose: ...
+def read_recording(path: _Path) -> _Recording: ...
+def read_flight(path: _Path) -> _Flight: ...

@@ -251,11 +251,17 @@ pub const LAYERS: &[Layer] = &[
         not_itself: &[PORTS, ARGUMENTS],
     },
     Layer {
+        folder: "host-ui/recordings",
+        may_use: &["host-ui/base", "host-ui/surfaces", "shm-schema"],
+        never: &[WINDOW, PORTS, DEVICES, DICOM],
+        not_itself: &[ARGUMENTS, PROGRAM],
+    },
+    Layer {
         folder: "host-ui/host",
         may_use: &[
             "host-ui/base",
             "host-ui/files",
-            "host-ui/surfaces",
+            "host-ui/recordings",
             "shm-schema",
             "shm-schema/anatomy",
             "shm-schema/ports",
@@ -367,8 +373,10 @@ pub const LAYERS: &[Layer] = &[
     Layer {
         folder: "rt-core/python",
         may_use: &[
+            "host-ui/base",
             "host-ui/dose",
             "host-ui/files",
+            "host-ui/recordings",
             "hw",
             "rt-core/runtime",
             "rt-core/sim",

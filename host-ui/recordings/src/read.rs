@@ -1,9 +1,9 @@
-//! Reads a recording for an export.
+//! Reads the ticks of a recording.
 
-use super::channels::Kind;
-use super::error::{FileProblem, RecordError};
-use super::gaps::Gaps;
-use super::stream;
+use crate::channels::Kind;
+use crate::error::{FileProblem, RecordingError};
+use crate::gaps::Gaps;
+use crate::stream;
 use std::path::Path;
 use stylet_shm_schema::{SecondRecord, TickRecord};
 
@@ -20,8 +20,8 @@ pub struct Recording {
 }
 
 /// Reads the ticks; refuses a file that holds none.
-pub fn read(path: &Path) -> Result<Recording, RecordError> {
-    let bytes = std::fs::read(path).map_err(|e| RecordError::of_file(path, FileProblem::Io(e)))?;
+pub fn read(path: &Path) -> Result<Recording, RecordingError> {
+    let bytes = std::fs::read(path).map_err(|e| RecordingError::new(path, FileProblem::Io(e)))?;
     let mut recording = Recording {
         ticks: Vec::new(),
         second: Vec::new(),
@@ -43,9 +43,9 @@ pub fn read(path: &Path) -> Result<Recording, RecordError> {
         }
         Ok(())
     });
-    recording.cut_off = cut_off.map_err(|why| RecordError::of_file(path, why))?;
+    recording.cut_off = cut_off.map_err(|why| RecordingError::new(path, why))?;
     if recording.ticks.is_empty() {
-        return Err(RecordError::of_file(path, FileProblem::NoTick));
+        return Err(RecordingError::new(path, FileProblem::NoTick));
     }
     Ok(recording)
 }

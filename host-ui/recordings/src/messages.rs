@@ -1,7 +1,7 @@
 //! Messages of a recording: what the core sends under the names of its fields, so that a recording outlives the layout
 //! of shared memory; a field unknown to the file takes its default.
 
-use crate::link::{SceneModel, Snapshot};
+use crate::{SceneModel, Snapshot};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use bytemuck::Zeroable;
@@ -26,6 +26,7 @@ struct NamedEvent {
     event: Event,
 }
 
+/// Writes an event.
 pub fn event(event: &Event) -> Value {
     message(&NamedEvent {
         kind: EventKind::from_number(event.kind).map_or_else(String::new, |kind| format!("{kind:?}")),
@@ -60,6 +61,7 @@ struct Tissue {
     bend_m: Vec<[f64; 3]>,
 }
 
+/// Writes the header of a snapshot.
 pub fn tissue(snapshot: &Snapshot) -> Value {
     let h = &snapshot.header;
     message(&Tissue {
@@ -88,7 +90,7 @@ fn fill<T: Copy>(room: &mut [T], from: &[T]) -> u32 {
     count as u32
 }
 
-/// Vertices of the deformed surface, in the order of the scene's rest surface.
+/// Writes the vertices of the deformed surface, in the order of the scene's rest surface.
 pub fn gland(snapshot: &Snapshot, time_ns: u64) -> Value {
     const FLOAT32: u32 = 7;
     let fields = ["x", "y", "z"].iter().enumerate();
@@ -102,7 +104,7 @@ pub fn gland(snapshot: &Snapshot, time_ns: u64) -> Value {
     })
 }
 
-/// The vertices of [`gland`].
+/// Returns the vertices of [`gland`].
 pub fn gland_of(data: &[u8]) -> Option<Vec<[f32; 3]>> {
     #[derive(Deserialize)]
     struct Gland {
@@ -134,6 +136,7 @@ struct Scene {
     words: String,
 }
 
+/// Writes a scene at rest.
 pub fn scene(model: &SceneModel) -> Value {
     let words: Vec<u8> = model.words().iter().flat_map(|word| word.to_le_bytes()).collect();
     message(&Scene {
@@ -169,6 +172,7 @@ struct Field {
     displacements: String,
 }
 
+/// Writes the displacements of a snapshot.
 pub fn field(snapshot: &Snapshot) -> Value {
     message(&Field {
         scene_generation: snapshot.header.scene_generation,
@@ -182,6 +186,7 @@ pub fn field_of(data: &[u8]) -> Option<(u64, Vec<[f32; 3]>)> {
     Some((field.scene_generation, places_of(&field.displacements)?))
 }
 
+/// Reads the announcement of a core; `None` for invalid bytes, as below.
 pub fn session_of(data: &[u8]) -> Option<Session> {
     let session: Session = serde_json::from_slice(data).ok()?;
     Some(Session {
@@ -199,6 +204,7 @@ struct Plan {
     needle: PlannedNeedle,
 }
 
+/// Writes a plan.
 pub fn plan(plan: &PlanInForce) -> Value {
     message(&Plan {
         generation: plan.generation,
@@ -207,6 +213,7 @@ pub fn plan(plan: &PlanInForce) -> Value {
     })
 }
 
+/// Reads a plan of that run.
 pub fn plan_of(data: &[u8], session_id: u64) -> Option<PlanInForce> {
     let plan: Plan = serde_json::from_slice(data).ok()?;
     Some(PlanInForce {
@@ -224,6 +231,7 @@ struct Parameters {
     values: BTreeMap<String, f64>,
 }
 
+/// Writes parameters by their keys.
 pub fn parameters(in_force: &ParametersInForce) -> Value {
     let value = |spec: &stylet_shm_schema::ParameterSpec| (spec.key.to_owned(), in_force.set.get(spec.id));
     message(&Parameters {
@@ -233,6 +241,7 @@ pub fn parameters(in_force: &ParametersInForce) -> Value {
     })
 }
 
+/// Reads parameters of that run; those that the file lacks have their defaults.
 pub fn parameters_of(data: &[u8], session_id: u64) -> Option<ParametersInForce> {
     let p: Parameters = serde_json::from_slice(data).ok()?;
     let mut in_force = ParametersInForce::zeroed();

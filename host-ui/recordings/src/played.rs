@@ -1,10 +1,10 @@
 //! Reads a recording for a window: the core's messages, each with its time.
 
-use super::channels::Kind;
-use super::error::{RecordError, ShowError};
-use super::messages;
-use super::stream;
-use crate::link::{Piece, Played, Snapshot};
+use crate::channels::Kind;
+use crate::error::{RecordingError, ShowError};
+use crate::messages;
+use crate::stream;
+use crate::{Piece, Played, Snapshot};
 use std::path::Path;
 use std::sync::Arc;
 use stylet_base::interrupt::Interrupt;
@@ -14,9 +14,9 @@ use stylet_shm_schema::{SecondRecord, Session, SnapshotHeader, TickRecord, check
 const MOST_BYTES: usize = 1 << 30;
 
 /// Reads a recording of `host-ui record` for a window; refuses one without a scene.
-pub fn played(path: &Path, interrupt: &Interrupt) -> Result<Played, RecordError> {
-    let bytes = stylet_base::input::read(path, MOST_BYTES as u64).map_err(|why| RecordError::of_file(path, why))?;
-    played_of(&bytes, interrupt).map_err(|why| RecordError::of_file(path, why))
+pub fn played(path: &Path, interrupt: &Interrupt) -> Result<Played, RecordingError> {
+    let bytes = stylet_base::input::read(path, MOST_BYTES as u64).map_err(|why| RecordingError::new(path, why))?;
+    played_of(&bytes, interrupt).map_err(|why| RecordingError::new(path, why))
 }
 
 /// As [`played`], for the bytes of a file; the text of an error follows the name of the file.

@@ -1,6 +1,6 @@
 //! Reads the messages of an MCAP file, whatever its bytes.
 
-use super::error::ShowError;
+use crate::error::ShowError;
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::collections::BTreeMap;

@@ -9,17 +9,27 @@ use serde_json::{Map, Value, json};
 /// Kind of a message; its number is that of its channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
+    /// Tick of the force loop.
     Tick,
+    /// Event of the core.
     Event,
+    /// Header of a snapshot.
     Tissue,
-    /// The well-known schema of point clouds, which viewers can draw.
+    /// Surface of a snapshot, in the well-known schema of point clouds, which viewers can draw.
     Gland,
+    /// Scene at rest.
     Scene,
+    /// Plan in force.
     Plan,
+    /// Parameters in force.
     Parameters,
+    /// What the core counts.
     State,
+    /// Displacements of a snapshot.
     Field,
+    /// Run of the core.
     Session,
+    /// Tick of the second device.
     Second,
 }
 
