@@ -144,6 +144,6 @@ mod tests {
         };
         assert_eq!(thread(&report), "SCHED_FIFO 80, core 2");
         (report.policy, report.core) = (0, u32::MAX);
-        assert_eq!(thread(&report), "not SCHED_FIFO, 80 asked, any core");
+        assert_eq!(thread(&report), "not SCHED_FIFO, 80 requested, any core");
     }
 }
