@@ -21,7 +21,7 @@ const PLOT_HEIGHTS: [f32; 2] = [48.0, 190.0];
 /// Height of a line on unseen ticks.
 const SEEN_LINE: f32 = 20.0;
 /// Height of the legend of the marks.
-const MARKS_LINE: f32 = 18.0;
+const MARKS_LINE: f32 = 22.0;
 /// Height of the line of the second device.
 const SECOND_LINE: f32 = 16.0;
 
