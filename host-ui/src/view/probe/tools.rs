@@ -81,7 +81,7 @@ impl ProbeView {
         let [mut way_mm, mut turn_deg] = before;
         let may_step = in_hand.is_none() || shown.is_second_simulated();
         let hint = "Keys PgUp, PgDn: 5 mm. 0 is the middle of the target, positive into the patient";
-        Knob("Travel", [-WAY_MM, WAY_MM], " mm", hint).ui(ui, &mut way_mm, may_step);
+        Knob("In", [-WAY_MM, WAY_MM], " mm", hint).ui(ui, &mut way_mm, may_step);
         let hint = "Keys Home, End: 5°. Turn about the probe's axis";
         Knob("Turn", [-TURN_DEG, TURN_DEG], "°", hint).ui(ui, &mut turn_deg, may_step);
         let by = [way_mm - before[0], turn_deg - before[1]];
