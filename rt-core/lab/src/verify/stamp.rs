@@ -26,7 +26,14 @@ pub fn check(file: &Path, ca: &Path) -> Result<String, StampError> {
         disk::read(needed)?;
     }
     let files: [&OsStr; 4] = ["-data".as_ref(), file.as_ref(), "-in".as_ref(), stamp.as_ref()];
-    let verified = openssl(&[&["-verify".as_ref()][..], &files[..], &["-CAfile".as_ref(), ca.as_ref()]].concat())?;
+    let verified = openssl(
+        &[
+            &["-verify".as_ref()][..],
+            &files[..],
+            &["-CAfile".as_ref(), ca.as_ref()],
+        ]
+        .concat(),
+    )?;
     if !verified.status.success() {
         let said = String::from_utf8_lossy(&verified.stderr).into_owned();
         let why = said.lines().find(|l| l.contains("error:")).or(said.lines().next());
