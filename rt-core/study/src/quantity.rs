@@ -78,7 +78,7 @@ pub fn limits(spec: &ParameterSpec) -> [f64; 2] {
 
 /// Returns whether the parameter does nothing in that tissue, so that its variation would be an empty column.
 pub fn has_no_part(spec: &ParameterSpec, tissue: TissueKind) -> bool {
-    TissueSpec::from(tissue).has_lines() && spec.help.contains("no part on a needle line")
+    TissueSpec::from(tissue).has_lines() && !spec.acts_on_a_line()
 }
 
 /// Returns every key that may vary, for errors.

@@ -100,6 +100,20 @@ impl ParameterId {
 }
 
 impl ParameterSpec {
+    /// Returns whether the parameter acts on a needle that slips by force along its line.
+    pub fn acts_on_a_line(&self) -> bool {
+        use ParameterId as P;
+        let of_the_paper = [
+            P::SpeedCoefficient,
+            P::DepthCoefficient,
+            P::StaticSpeed,
+            P::RetractionRatio,
+            P::StickStiffness,
+        ];
+        let cutting = [P::CuttingForce, P::SkinCutting, P::SurroundingsCutting, P::WallCutting];
+        !of_the_paper.contains(&self.id) && !cutting.contains(&self.id)
+    }
+
     /// True if `value` (SI) is a number within the limits.
     pub fn allows(&self, value: f64) -> bool {
         // NaN is in no range.

@@ -32,6 +32,15 @@ fn the_numbers_of_schema_5_still_stand() {
     }
 }
 
+/// Guards against a study that took this from the help, and no longer refused an empty column when its words changed.
+#[test]
+fn the_help_says_what_does_not_act_on_a_line() {
+    for spec in &PARAMETERS {
+        let is_named = spec.help.contains("Not used on a needle line");
+        assert_eq!(is_named, !spec.acts_on_a_line(), "{}", spec.key);
+    }
+}
+
 #[test]
 fn every_bad_value_is_named() {
     let mut set = ParameterSet::default();
