@@ -92,9 +92,10 @@ impl Kind {
 
     /// Returns the colour of its outline in a panel, the same as over an image if the panel is dark too.
     pub fn panel_color(self, tokens: &Tokens) -> Color32 {
-        match tokens.dark {
-            true => self.image_color(),
-            false => self.color(tokens),
+        if tokens.dark {
+            self.image_color()
+        } else {
+            self.color(tokens)
         }
     }
 

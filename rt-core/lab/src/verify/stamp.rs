@@ -25,22 +25,17 @@ pub fn check(file: &Path, ca: &Path) -> Result<String, StampError> {
     for needed in [file, ca, &stamp] {
         disk::read(needed)?;
     }
-    let files: [&OsStr; 4] = ["-data".as_ref(), file.as_ref(), "-in".as_ref(), stamp.as_ref()];
-    let verified = openssl(
-        &[
-            &["-verify".as_ref()][..],
-            &files[..],
-            &["-CAfile".as_ref(), ca.as_ref()],
-        ]
-        .concat(),
-    )?;
+    let word = OsStr::new;
+    let of_file = [word("-verify"), word("-data"), file.as_ref()];
+    let by_stamp = [word("-in"), stamp.as_ref(), word("-CAfile"), ca.as_ref()];
+    let verified = openssl(of_file.into_iter().chain(by_stamp))?;
     if !verified.status.success() {
         let said = String::from_utf8_lossy(&verified.stderr).into_owned();
         let why = said.lines().find(|l| l.contains("error:")).or(said.lines().next());
         let said = why.unwrap_or("no reason given").to_owned();
         return Err(StampError::Refused { stamp, said });
     }
-    let shown = openssl(&[&["-reply".as_ref()][..], &files[2..], &["-text".as_ref()]].concat())?;
+    let shown = openssl([word("-reply"), word("-in"), stamp.as_ref(), word("-text")])?;
     let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
     let time = shown.lines().find_map(|l| l.strip_prefix("Time stamp:"));
     Ok(format!(
@@ -49,7 +44,7 @@ pub fn check(file: &Path, ca: &Path) -> Result<String, StampError> {
     ))
 }
 
-fn openssl(words: &[&OsStr]) -> Result<Output, StampError> {
+fn openssl<'a>(words: impl IntoIterator<Item = &'a OsStr>) -> Result<Output, StampError> {
     let run = Command::new("openssl")
         .arg("ts")
         .args(words)
