@@ -15,7 +15,9 @@ use serde_json::Value;
 #[cfg(test)]
 use std::path::Path;
 #[cfg(test)]
-use std::process::Command;
+use std::process::{Child, Command};
+#[cfg(test)]
+use std::time::Duration;
 
 /// Returns a command in the folder of a test; recordings of flights stay there, too.
 #[cfg(test)]
@@ -33,6 +35,21 @@ fn typed(program: &str, words: &[&str], folder: &Path) -> String {
     let why = String::from_utf8_lossy(&done.stderr);
     assert!(done.status.success(), "{program} {words:?}: {said}{why}");
     said
+}
+
+/// A program that ends with its owner, by SIGTERM: a core that is killed leaves its shared memory behind.
+#[cfg(test)]
+struct Ended(Child);
+
+#[cfg(test)]
+impl Drop for Ended {
+    fn drop(&mut self) {
+        let _ = Command::new("kill").arg(self.0.id().to_string()).status();
+        if !stylet_test_kit::until(Duration::from_secs(10), || !matches!(self.0.try_wait(), Ok(None))) {
+            let _ = self.0.kill();
+            let _ = self.0.wait();
+        }
+    }
 }
 
 #[cfg(test)]

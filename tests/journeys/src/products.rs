@@ -1,10 +1,8 @@
 //! The laboratory, a study with its page, commands on files, and OpenIGTLink.
 
-use crate::{command, json, typed};
+use crate::{Ended, command, json, typed};
 use std::io::Read;
 use std::net::{TcpListener, TcpStream};
-use std::path::Path;
-use std::process::Child;
 use std::time::Duration;
 use stylet_test_kit::{repository, scratch, until};
 
@@ -77,22 +75,6 @@ fn a_seed_gives_the_published_dose_at_1_cm() {
     );
 }
 
-/// A program of a test, ended with it.
-struct Running(Child);
-
-impl Running {
-    fn start(name: &str, words: &[&str], folder: &Path) -> Self {
-        Self(command(name, words, folder).spawn().expect("it starts"))
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 #[test]
 fn a_client_of_openigtlink_receives_the_needle() {
     let folder = scratch("journey-igtl");
@@ -102,12 +84,9 @@ fn a_client_of_openigtlink_receives_the_needle() {
         .expect("a port");
     let address = port.to_string();
     let core = ["--instance", &instance, "--rt-if-allowed"];
-    let _core = Running::start("rt-core", &core, &folder);
-    let _server = Running::start(
-        "host-ui",
-        &["igtl", "--instance", &instance, "--listen", &address],
-        &folder,
-    );
+    let start = |name, words: &[&str]| Ended(command(name, words, &folder).spawn().expect("it starts"));
+    let _core = start("rt-core", &core);
+    let _server = start("host-ui", &["igtl", "--instance", &instance, "--listen", &address]);
     let mut stream = None;
     assert!(until(Duration::from_secs(20), || {
         stream = TcpStream::connect(&address).ok();

@@ -1,9 +1,10 @@
 //! A page of the repository, and a folder in which its commands are typed.
 
+use crate::Ended;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::Duration;
 use stylet_test_kit::{program, repository, scratch, until};
 
@@ -38,16 +39,6 @@ pub struct Page {
     blocks: Vec<String>,
     left: Vec<String>,
     core: Option<Ended>,
-}
-
-/// A program that is ended with its owner.
-struct Ended(Child);
-
-impl Drop for Ended {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 impl Page {
