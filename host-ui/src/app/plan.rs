@@ -24,8 +24,6 @@ pub(super) struct Script {
     pub needles: Vec<usize>,
     /// Needles and seeds in the tissue when the script began or continued.
     pub placed: Placed,
-    /// Needles of a stopped script, and its drops that left no seed.
-    pub lost: (Vec<NeedleTask>, Vec<usize>),
 }
 
 impl Script {
@@ -163,9 +161,7 @@ impl App {
     /// Returns the part of the plan that is in the tissue.
     fn placed(&self, tasks: &[NeedleTask]) -> Placed {
         let dropped_at_m: Vec<[f64; 3]> = self.shown.seeds.iter().map(|seed| seed.dropped_at_m).collect();
-        // Another plan numbers its needles differently.
-        let (of, lost) = &self.script.lost;
-        let lost = if of == tasks { &lost[..] } else { &[] };
+        let lost = &self.planner.progress().lost;
         Placed::find(tasks, &dropped_at_m, self.shown.tip_m(), lost)
     }
 
@@ -235,18 +231,14 @@ impl App {
         self.drive = Drive::default();
     }
 
-    /// Ends the script; its drops without a seed are kept for a later continuation.
     pub(super) fn end_run(&mut self) {
-        if let Some(run) = self.run.take() {
-            self.script.lost = (run.tasks().to_vec(), run.lost().to_vec());
-        }
-        (self.shown.run_waits, self.placed_found) = (None, Instant::now());
+        (self.run, self.shown.run_waits, self.placed_found) = (None, None, Instant::now());
     }
 
     /// Starts over: all needles of the plan from a reset, or one needle through the middle without
     /// a plan.
     fn start_over(&mut self) {
-        (self.script.placed, self.script.lost) = (Placed::default(), Default::default());
+        self.script.placed = Placed::default();
         if self.planner.is_busy() {
             self.refuse("Wait for the running task, or cancel it first.");
             return;

@@ -183,6 +183,7 @@ mod tests {
         let mut planner = super::super::tests::planner();
         let plan = planner.plan().expect("a plan").clone();
         planner.begin_needle(0, 0);
+        planner.take_lost(&[1]);
         let done = Compensation {
             drops: Drops::as_planned(&plan.needles[1]),
             before_m: None,

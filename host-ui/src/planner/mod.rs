@@ -351,6 +351,11 @@ impl Planner {
         self.advance(|progress| progress.finish(seeds));
     }
 
+    /// Takes the drops of a script that left no seed, counted from 0 over all needles.
+    pub fn take_lost(&mut self, lost: &[usize]) {
+        self.advance(|progress| progress.lost = lost.to_vec());
+    }
+
     /// Marks the inserted needle as planned again.
     pub fn step_back(&mut self) {
         self.advance(NeedleProgress::step_back);

@@ -33,6 +33,9 @@ pub struct NeedleProgress {
     is_done: bool,
     /// Number of seeds in the tissue when the last finished needle was done.
     seeds_when_done: usize,
+    /// Drops of a script that left no seed, counted from 0 over all needles.
+    #[serde(default)]
+    pub lost: Vec<usize>,
 }
 
 impl NeedleProgress {
@@ -82,8 +85,9 @@ impl NeedleProgress {
         self.is_done &= seeds >= self.seeds_when_done;
     }
 
-    /// Removes the inserted needle from the progress.
+    /// Removes the inserted needle from the progress; lost seeds may be dropped again.
     pub fn step_back(&mut self) {
+        self.lost.clear();
         if let Some(seeds) = self.first_seed.pop() {
             (self.is_done, self.seeds_when_done) = (true, seeds);
         }

@@ -222,11 +222,6 @@ impl Run {
         self.procedure.step()
     }
 
-    /// Returns the needles, in the order in which they are inserted.
-    pub fn tasks(&self) -> &[NeedleTask] {
-        &self.tasks
-    }
-
     /// Returns the condition for which it waits, and for how long.
     pub fn waiting(&self) -> Waiting {
         self.procedure.waiting()
