@@ -9,6 +9,8 @@ const KEY: &str = "stylet.settings";
 pub const SCALES: [f32; 2] = [0.8, 2.0];
 /// Points of the window in which a scale of 1 is the size of text.
 const MADE_FOR: [f32; 2] = [1280.0, 800.0];
+/// Fewest points that hold all controls; a larger scale is not applied in full.
+const LEAST: [f32; 2] = [640.0, 360.0];
 /// Change of the scale by a key.
 const STEP: f32 = 0.1;
 /// Range of the air kerma strength of a seed (U).
@@ -123,23 +125,32 @@ impl Settings {
         self.scale = ((changed / STEP).round() * STEP).clamp(SCALES[0], SCALES[1]);
     }
 
-    /// Applies colours and the size of text, in a window that enlarges it by `fit`.
-    pub fn apply(&self, ctx: &egui::Context, fit: f32) {
+    /// Applies colours and the size of text, in a window that enlarges it by `fit` up to `most`.
+    pub fn apply(&self, ctx: &egui::Context, [fit, most]: [f32; 2]) {
         ctx.set_theme(match self.theme {
             ThemeChoice::Dark => egui::Theme::Dark,
             ThemeChoice::Light => egui::Theme::Light,
         });
-        ctx.set_zoom_factor((self.scale * fit).clamp(SCALES[0], SCALES[1]));
+        ctx.set_zoom_factor((self.scale * fit).clamp(SCALES[0], SCALES[1]).min(most));
     }
 }
 
-/// Returns how much the present window enlarges text.
-pub fn fit_of(ctx: &egui::Context) -> f32 {
+/// Returns how much the present window enlarges text, and the largest scale that it has room for.
+pub fn fit_of(ctx: &egui::Context) -> [f32; 2] {
     // Without a screen, as in tests, the size does not follow the scale.
     match ctx.input(|i| i.viewport().monitor_size) {
-        Some(_) => text_scale(ctx.content_rect().size() * ctx.zoom_factor()),
-        None => 1.0,
+        Some(_) => {
+            let size = ctx.content_rect().size() * ctx.zoom_factor();
+            [text_scale(size), largest_scale(size)]
+        }
+        None => [1.0, SCALES[1]],
     }
+}
+
+/// Returns the largest scale that a window of this size in points has room for, in eighths.
+fn largest_scale(size: egui::Vec2) -> f32 {
+    let times = (size.x / LEAST[0]).min(size.y / LEAST[1]);
+    ((times * 8.0).floor() / 8.0).clamp(0.5, SCALES[1])
 }
 
 /// Returns how much a window of this size in points enlarges text: in eighths, so that text keeps
@@ -186,6 +197,19 @@ mod tests {
             ([3840.0, 800.0], 1.0),
         ] {
             assert_eq!(text_scale(size.into()), times, "{size:?}");
+        }
+    }
+
+    #[test]
+    fn text_grows_no_further_than_the_window_has_room_for() {
+        for (size, times) in [
+            ([480.0, 300.0], 0.75),
+            ([960.0, 600.0], 1.5),
+            ([1280.0, 720.0], 2.0),
+            ([3840.0, 2160.0], 2.0),
+            ([1.0, 1.0], 0.5),
+        ] {
+            assert_eq!(largest_scale(size.into()), times, "{size:?}");
         }
     }
 

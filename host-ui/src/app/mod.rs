@@ -106,8 +106,8 @@ pub struct App {
     dose: DoseWorker,
     pictures: Pictures,
     settings: Settings,
-    /// Settings when they were last applied, and how much the window enlarged text.
-    applied: Option<(Settings, f32)>,
+    /// Settings when they were last applied, and how much the window enlarged text, and could at most.
+    applied: Option<(Settings, [f32; 2])>,
     history: History,
     /// Procedure as any host receives it.
     heard: ReceivedProcedure,

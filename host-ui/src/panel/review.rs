@@ -142,7 +142,6 @@ fn dose_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     let review = &shown.planning.review;
     ui.horizontal(|ui| {
         ui.label(theme::strong("Dose"));
-        ui.label(theme::small("of the seeds"));
         for which in [SeedsFrom::Tissue, SeedsFrom::Marks] {
             if ui.selectable_label(review.seeds_from == which, which.name()).clicked() {
                 actions.push(Action::Plan(PlanAction::SeedsFrom(which)));

@@ -144,6 +144,8 @@ impl Middle {
         tools.show(ui, |ui| {
             ui.spacing_mut().item_spacing = spacing;
             ui.set_min_width(ui.available_width());
+            // A tool without room begins a row and is not narrowed.
+            ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
             ui.horizontal_wrapped(|ui| self.tools_ui(ui, layout, shown, &mut actions));
         });
         let rect = ui.available_rect_before_wrap();

@@ -89,15 +89,13 @@ impl ProbeView {
             actions.extend(self.step(shown, by));
         }
         // It keeps its place while the core is silent.
-        ui.add_enabled_ui(in_hand.is_some() && may_step, |ui| {
-            let mut is_locked = shown.stepper.is_locked;
-            let brake = ui.toggle_value(&mut is_locked, "Brake");
-            let hint = "Key B: the stepper holds the probe; only its steps move it";
-            let brake = brake.on_disabled_hover_text("Only the simulated hand of rt-core --device-2 has a brake");
-            if brake.on_hover_text(hint).clicked() {
-                actions.push(Action::Probe(ProbeAction::ToggleBrake));
-            }
-        });
+        let brake = egui::Button::selectable(shown.stepper.is_locked, "Brake");
+        let brake = ui.add_enabled(in_hand.is_some() && may_step, brake);
+        let hint = "Key B: the stepper holds the probe; only its steps move it";
+        let brake = brake.on_disabled_hover_text("Only the simulated hand of rt-core --device-2 has a brake");
+        if brake.on_hover_text(hint).clicked() {
+            actions.push(Action::Probe(ProbeAction::ToggleBrake));
+        }
         actions
     }
 
