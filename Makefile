@@ -59,8 +59,10 @@ package: deps-package build-release ## Build the Debian packages of both program
 package-test: deps-package-test package ## Install both packages in a fresh Debian root, run them, purge them, list what remains
 	docs/tools/package-test
 
-picture: deps-test build ## Redraw the pictures of the README and the tour
+picture: deps-test build ## Redraw the kept pictures of the window, and in real time those of the README and the tour
 	UPDATE_SNAPSHOTS=1 $(CARGO) test --profile quick -p stylet-tests-window -- --test-threads=1
+	STYLET_TOUR=1 $(CARGO) test --profile quick -p stylet-tests-window -- --test-threads=1 live:: states:: plan:: probe:: update::
+	STYLET_TOUR=1 $(CARGO) test --profile quick -p stylet-tests-window -- --test-threads=1 --ignored a_seed_is_dropped_in_the_pelvis an_update_on_the_live_picture
 
 animation: deps-test ## Redraw the moving picture of the README from the recorded example (some minutes)
 	$(CARGO) test --profile quick -p stylet-tests-window --lib animation -- --ignored --nocapture

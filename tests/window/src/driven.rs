@@ -28,7 +28,7 @@ impl Driven {
 
     /// Opens a core without real time, so that the machine's rights do not matter.
     pub fn open_plain(size: [f32; 2]) -> Self {
-        Self::on(Core::start_with(&["--no-rt"]), size)
+        Self::on(Core::start_with(&[plain()]), size)
     }
 
     pub fn on(core: Core, size: [f32; 2]) -> Self {
@@ -270,9 +270,19 @@ pub fn assert_drawn_by_changes(window: &mut Harness, state: &str) {
     assert_eq!(differing.len(), 0, "{state}: {some:?}");
 }
 
-/// Saves a picture for the documentation; called only by `make picture`.
+/// Returns whether pictures of the documentation are drawn, by `make picture`: in real time, and beside no kept picture.
+pub fn is_for_docs() -> bool {
+    std::env::var_os("STYLET_TOUR").is_some()
+}
+
+/// Returns the option of a core whose pictures look alike on every machine.
+pub fn plain() -> &'static str {
+    if is_for_docs() { "--rt-if-allowed" } else { "--no-rt" }
+}
+
+/// Saves a picture of the documentation.
 pub fn keep_for_docs(picture: &image::RgbaImage, name: &str) {
-    if std::env::var_os("UPDATE_SNAPSHOTS").is_none() {
+    if !is_for_docs() {
         return;
     }
     let place = format!("{}/../../docs/pictures/{name}.png", env!("CARGO_MANIFEST_DIR"));

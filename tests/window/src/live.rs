@@ -1,6 +1,6 @@
 //! The real window on a running core, driven by label through the steps.
 //!
-//! Its picture is the README's; `make picture` keeps it.
+//! `make picture` keeps pictures of it for the README and the tour.
 
 use crate::driven::{Driven, keep_for_docs, options_of};
 use crate::opened::open_window;
@@ -14,9 +14,31 @@ use std::time::Duration;
 use stylet_implant::plan::file;
 use stylet_shm_schema::{Phase, flags};
 use stylet_surfaces::field::Field;
+use stylet_tests::Core;
 
 fn phase(app: &App) -> u32 {
     app.link().state().map_or(0, |s| s.phase)
+}
+
+#[test]
+#[ignore = "draws the first picture of the README"]
+fn a_seed_is_dropped_in_the_pelvis() {
+    let core = Core::start_with(&["--rt-if-allowed", "--scene", "pelvis"]);
+    let mut driven = Driven::on(core, [1280.0, 800.0]);
+    driven.plan_and_place();
+    driven.until("the needle line", |app| {
+        app.link().state().is_some_and(|s| s.flags & flags::LINE_READY != 0)
+    });
+    driven.click("Engage force");
+    driven.click("Insert");
+    driven.until("the deepest seed", |app| {
+        app.link()
+            .state()
+            .is_some_and(|s| s.flags & flags::PUNCTURED != 0 && s.flags & flags::AT_GOAL != 0)
+    });
+    driven.click("Drop seed");
+    driven.come_to_rest();
+    keep_for_docs(&driven.picture("window"), "window");
 }
 
 #[test]
@@ -54,7 +76,6 @@ fn four_steps_by_label_move_the_gland_and_drop_a_seed() {
         app.link().snapshot().is_some_and(|s| s.header.seed_count == 1)
     });
     driven.come_to_rest();
-    keep_for_docs(&driven.picture("window"), "window");
     driven.click("Retract");
     driven.until("the needle outside", |app| phase(app) == Phase::Outside as u32);
     let generation = driven.window.state().link().parameters().map(|p| p.generation);

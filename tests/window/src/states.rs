@@ -145,13 +145,13 @@ fn the_whole_procedure_by_one_key_ends_in_a_debrief() {
     keep_for_docs(&picture, "debrief");
     driven.compare_live("debrief_dark_small", DEBRIEF_PIXELS);
     driven.window.get_by_label_contains("Whole procedure: force");
-    debrief_is_saved(&mut driven);
     driven.press(Key::V);
     driven.press(Key::Num2);
     driven.picture("perineum");
     driven.press(Key::Num1);
     let picture = driven.picture("dose");
     keep_for_docs(&picture, "dose");
+    debrief_is_saved(&mut driven);
     driven.press(Key::T);
     assert_in_place(&mut driven, "debrief, light");
     driven.picture("debrief-light");
