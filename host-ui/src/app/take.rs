@@ -267,7 +267,10 @@ impl App {
             self.shown.run_step = Some(run.step());
             self.shown.run_waits = Some(run.waiting());
             self.shown.run_needle = self.script.in_plan(needle, self.planner.plan());
-            self.planner.take_lost(run.lost());
+            // One needle by hand has no plan whose drops could be counted.
+            if !self.script.needles.is_empty() {
+                self.planner.take_lost(run.lost());
+            }
             self.follow_run(needle, status == RunStatus::Done);
             self.shown.note = match status {
                 RunStatus::Working => None,

@@ -28,7 +28,7 @@ impl Driven {
 
     /// Opens a core without real time, so that the machine's rights do not matter.
     pub fn open_plain(size: [f32; 2]) -> Self {
-        Self::on(Core::start_with(&[plain()]), size)
+        Self::on(Core::start_with(&[real_time_option()]), size)
     }
 
     pub fn on(core: Core, size: [f32; 2]) -> Self {
@@ -270,13 +270,13 @@ pub fn assert_drawn_by_changes(window: &mut Harness, state: &str) {
     assert_eq!(differing.len(), 0, "{state}: {some:?}");
 }
 
-/// Returns whether pictures of the documentation are drawn, by `make picture`: in real time, and beside no kept picture.
+/// Returns whether `make picture` draws pictures of the documentation: in real time, and compared with no kept picture.
 pub fn is_for_docs() -> bool {
     std::env::var_os("STYLET_TOUR").is_some()
 }
 
-/// Returns the option of a core whose pictures look alike on every machine.
-pub fn plain() -> &'static str {
+/// Returns the option of a core: without real time pictures look alike on every machine.
+pub fn real_time_option() -> &'static str {
     if is_for_docs() { "--rt-if-allowed" } else { "--no-rt" }
 }
 

@@ -20,6 +20,16 @@ fn phase(app: &App) -> u32 {
     app.link().state().map_or(0, |s| s.phase)
 }
 
+/// Inserts the needle to the deepest planned seed.
+fn insert(driven: &mut Driven) {
+    driven.click("Insert");
+    driven.until("the deepest seed", |app| {
+        app.link()
+            .state()
+            .is_some_and(|s| s.flags & flags::PUNCTURED != 0 && s.flags & flags::AT_GOAL != 0)
+    });
+}
+
 #[test]
 #[ignore = "draws the first picture of the README"]
 fn a_seed_is_dropped_in_the_pelvis() {
@@ -30,12 +40,7 @@ fn a_seed_is_dropped_in_the_pelvis() {
         app.link().state().is_some_and(|s| s.flags & flags::LINE_READY != 0)
     });
     driven.click("Engage force");
-    driven.click("Insert");
-    driven.until("the deepest seed", |app| {
-        app.link()
-            .state()
-            .is_some_and(|s| s.flags & flags::PUNCTURED != 0 && s.flags & flags::AT_GOAL != 0)
-    });
+    insert(&mut driven);
     driven.click("Drop seed");
     driven.come_to_rest();
     keep_for_docs(&driven.picture("window"), "window");
@@ -65,12 +70,7 @@ fn four_steps_by_label_move_the_gland_and_drop_a_seed() {
     assert!(differing_pixels(&before, &during) > 2_000, "the picture did not change");
     assert_inside_moves_as_the_surface_does(driven.window.state());
     assert_slice_shows_the_dent(&driven, &before, &during);
-    driven.click("Insert");
-    driven.until("the deepest seed", |app| {
-        app.link()
-            .state()
-            .is_some_and(|s| s.flags & flags::PUNCTURED != 0 && s.flags & flags::AT_GOAL != 0)
-    });
+    insert(&mut driven);
     driven.click("Drop seed");
     driven.until("a seed", |app| {
         app.link().snapshot().is_some_and(|s| s.header.seed_count == 1)

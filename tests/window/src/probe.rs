@@ -1,6 +1,6 @@
 //! The probe's picture and fluoroscopy on a running core: pose, motion, held image and cost.
 
-use crate::driven::{Driven, assert_drawn_by_changes, keep_for_docs, misplaced, plain};
+use crate::driven::{Driven, assert_drawn_by_changes, keep_for_docs, misplaced, real_time_option};
 use crate::kept::{assert_like_kept, tolerant};
 use egui::{Event, Key, Modifiers, Pos2};
 use egui_kittest::kittest::Queryable;
@@ -30,7 +30,7 @@ fn seen(app: &App) -> Option<Pose> {
 }
 
 fn open(layout: &str, options: &[&str]) -> Driven {
-    let options = [&[plain(), "--scene", "pelvis"], options].concat();
+    let options = [&[real_time_option(), "--scene", "pelvis"], options].concat();
     let mut driven = Driven::on(Core::start_with(&options), SMALL);
     driven.click(layout);
     driven
