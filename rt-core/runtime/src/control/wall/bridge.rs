@@ -1,20 +1,19 @@
-//! The force process's side of the wall: starts the bridge, sends it everything for hosts, and restarts it when it
+//! The wall to a bridge: starts the bridge, sends it everything for hosts, and restarts it when it
 //! fails.
 //!
 //! Input from the bridge is untrusted. State for a new bridge is kept here: the newest of each state, the last events
 //! and answers, and 12 s of records.
 
-mod child;
-mod journal;
-mod kept;
-mod outbox;
-
-pub use child::watcher;
-use child::{Running, SILENT_AFTER, program};
-use journal::Journal;
-use kept::Kept;
-pub use outbox::Outbox;
+use super::child::{Running, SILENT_AFTER, program};
+use super::journal::Journal;
+use super::kept::Kept;
+use super::outbox::Outbox;
+use super::{Asked, MOST_PACKETS, Wall};
+use crate::background::Work;
+use crate::rt::clock;
+use crate::rt::shown::Shown;
 use std::collections::VecDeque;
+use std::io;
 use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::process::{Child, Command as Process, Stdio};
@@ -23,10 +22,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::*;
-use stylet_wall::packet::{Alive, Kind, Socket, Start, unsealed};
+use stylet_wall::board::Writer;
+use stylet_wall::packet::{Alive, BoardSize, Kind, Socket, Start, sealed, unsealed};
 
-/// Most packets of the bridge taken in one pass; the rest wait in its socket.
-pub const MOST_PACKETS: usize = 256;
 /// Interval between checks for complaints of hosts, and shortest life of an epoch.
 const COMPLAINTS_EVERY: Duration = Duration::from_millis(100);
 const SHORTEST_EPOCH: Duration = Duration::from_secs(2);
@@ -54,24 +52,16 @@ pub enum BridgeError {
     Failed(String),
 }
 
-/// A request of a host.
-pub enum Asked {
-    /// A request as plain data.
-    Command(Box<Command>),
-    /// A volume and its cells.
-    Volume(Box<UploadHeader>, Vec<u8>),
-}
-
 /// The force process's connection to its bridge; one per run.
-pub struct Wall {
+pub struct Bridge {
     running: Option<Running>,
     outbox: Outbox,
     kept: Kept,
     program: PathBuf,
     /// Records of the force loop.
-    pub records: Journal<TickRecord>,
+    records: Journal<TickRecord>,
     /// Records of the second device's loop.
-    pub second_records: Journal<SecondRecord>,
+    second_records: Journal<SecondRecord>,
     asked: VecDeque<Asked>,
     /// A host takes snapshots: read by the tissue loop.
     is_watched: Arc<AtomicBool>,
@@ -84,11 +74,13 @@ pub struct Wall {
     lost: Option<String>,
     /// Killed, but not reaped yet.
     dying: Vec<Child>,
+    /// Board of the scene that is shown next.
+    made: Option<(BoardSize, OwnedFd)>,
     /// Last field, so dropped last: dropping it removes the instance's files.
     owned: Owned,
 }
 
-impl Wall {
+impl Bridge {
     /// Starts the first bridge, with the boards of the force loop and of the second device's loop, and waits until its
     /// ports are open.
     pub fn new(
@@ -111,9 +103,10 @@ impl Wall {
             looked: Instant::now(),
             lost: None,
             dying: Vec::new(),
+            made: None,
             owned,
         };
-        wall.keep(Kind::Start, &start);
+        wall.put(Kind::Start, bytemuck::bytes_of(&start));
         wall.keep_with(Kind::State, &[], Some(state));
         if let Some(board) = second_state {
             wall.keep_with(Kind::SecondState, &[], Some(board));
@@ -131,65 +124,14 @@ impl Wall {
         Ok(wall)
     }
 
-    /// Hosts can join.
-    pub fn is_open(&self) -> bool {
-        self.running.as_ref().is_some_and(|running| running.is_ready)
-    }
-
-    /// Waits for the bridge, at most `longest`.
-    pub fn wait(&self, longest: Duration) {
-        match &self.outbox.socket {
-            Some(socket) => socket.wait(longest),
-            None => std::thread::sleep(longest),
-        }
-    }
-
-    /// Runs one pass: sends queued packets, takes the bridge's packets, and checks that it lives.
-    pub fn pass(&mut self) {
-        self.outbox.flush();
-        self.receive();
-        self.dying.retain_mut(|child| matches!(child.try_wait(), Ok(None)));
-        if let Some(why) = self.trouble() {
-            self.end_bridge();
-            self.lost = Some(why);
-        }
-        if self.running.is_none()
-            && self.tried.elapsed() >= RETRY_EVERY
-            && let Err(why) = self.spawn()
-        {
-            self.lost = Some(why.to_string());
-        }
-    }
-
-    /// Returns once why the last bridge was lost.
-    pub fn take_lost(&mut self) -> Option<String> {
-        self.lost.take()
-    }
-
-    /// Returns the next request of a host: in order, but those of the queue of stops first.
-    pub fn take_asked(&mut self) -> Option<Asked> {
-        self.receive();
-        self.asked.pop_front()
-    }
-
-    /// Number of requests refused by the bridges.
-    pub fn refused(&self) -> u64 {
-        self.refused + self.running.as_ref().map_or(0, |running| running.refused)
-    }
-
     /// Sends records that are due, or all if `at_once`.
-    pub fn send_records(&mut self, at_once: bool) {
+    fn send_records(&mut self, at_once: bool) {
         self.records.send(&mut self.outbox, at_once);
         self.second_records.send(&mut self.outbox, at_once);
     }
 
-    /// Sends a value to the bridge, and keeps it for the next one.
-    pub fn keep<T: bytemuck::Pod>(&mut self, kind: Kind, value: &T) {
-        self.keep_with(kind, bytemuck::bytes_of(value), None);
-    }
-
-    /// As [`keep`](Self::keep), with the memory that belongs to the value.
-    pub fn keep_with(&mut self, kind: Kind, bytes: &[u8], memory: Option<OwnedFd>) {
+    /// Sends a value to the bridge with the memory that belongs to it, and keeps it for the next one.
+    fn keep_with(&mut self, kind: Kind, bytes: &[u8], memory: Option<OwnedFd>) {
         let packet = (kind, bytes.to_vec(), memory.map(Rc::new));
         self.outbox.put(packet.clone());
         self.kept.put(packet);
@@ -301,7 +243,92 @@ impl Wall {
     }
 }
 
-impl Drop for Wall {
+impl Wall for Bridge {
+    fn now_ns(&self) -> u64 {
+        clock::now_ns()
+    }
+
+    fn work(&self) -> Work {
+        Work::Threads
+    }
+
+    fn is_open(&self) -> bool {
+        self.running.as_ref().is_some_and(|running| running.is_ready)
+    }
+
+    fn wait(&self, longest: Duration) {
+        match &self.outbox.socket {
+            Some(socket) => socket.wait(longest),
+            None => std::thread::sleep(longest),
+        }
+    }
+
+    /// Takes the bridge's packets too, and checks that it lives.
+    fn pass(&mut self) {
+        self.outbox.flush();
+        self.receive();
+        self.dying.retain_mut(|child| matches!(child.try_wait(), Ok(None)));
+        if let Some(why) = self.trouble() {
+            self.end_bridge();
+            self.lost = Some(why);
+        }
+        if self.running.is_none()
+            && self.tried.elapsed() >= RETRY_EVERY
+            && let Err(why) = self.spawn()
+        {
+            self.lost = Some(why.to_string());
+        }
+    }
+
+    fn take_lost(&mut self) -> Option<String> {
+        self.lost.take()
+    }
+
+    /// In order, but those of the queue of stops first.
+    fn take_asked(&mut self) -> Option<Asked> {
+        self.receive();
+        self.asked.pop_front()
+    }
+
+    fn refused(&self) -> u64 {
+        self.refused + self.running.as_ref().map_or(0, |running| running.refused)
+    }
+
+    fn newest_record(&self) -> Option<&TickRecord> {
+        self.records.newest()
+    }
+
+    fn take_records(&mut self, records: &mut rtrb::Consumer<TickRecord>) {
+        self.records.take(records);
+        self.send_records(false);
+    }
+
+    fn take_second_records(&mut self, records: &mut rtrb::Consumer<SecondRecord>) -> bool {
+        self.second_records.take(records)
+    }
+
+    fn put(&mut self, kind: Kind, bytes: &[u8]) {
+        self.keep_with(kind, bytes, None);
+    }
+
+    fn make_board(&mut self, len: usize) -> io::Result<Shown> {
+        let (writer, memory) = Writer::new("stylet-snapshots", len)?;
+        self.made = Some((BoardSize { len: len as u64 }, memory));
+        Ok(Shown::Board(writer))
+    }
+
+    fn show_scene(&mut self, header: &SceneHeader, words: &[u32]) {
+        if let Some((size, board)) = self.made.take() {
+            self.keep_with(Kind::Snapshots, bytemuck::bytes_of(&size), Some(board));
+        }
+        match sealed("stylet-scene", words) {
+            Ok(words) => self.keep_with(Kind::Scene, bytemuck::bytes_of(header), Some(words)),
+            Err(why) => eprintln!("rt-core: the scene cannot be shown: {why}"),
+        }
+    }
+}
+
+impl Drop for Bridge {
     fn drop(&mut self) {
         let begun = Instant::now();
         self.send_records(true);
