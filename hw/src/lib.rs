@@ -14,6 +14,7 @@ pub mod convert;
 pub mod drd;
 #[cfg(not(target_family = "wasm"))]
 mod driver_thread;
+#[cfg(not(target_family = "wasm"))]
 mod finding;
 #[cfg(not(target_family = "wasm"))]
 pub mod haply;
@@ -36,6 +37,7 @@ pub use driver_thread::arm::{Arm, ArmError};
 pub use driver_thread::keeper::Report;
 #[cfg(not(target_family = "wasm"))]
 pub use driver_thread::served::{Described, Served};
+#[cfg(not(target_family = "wasm"))]
 pub use finding::{Finding, Severity};
 #[cfg(not(target_family = "wasm"))]
 pub use haply::{Haply, HaplyConfig};

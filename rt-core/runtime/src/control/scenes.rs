@@ -136,7 +136,8 @@ impl Control {
         picture.header.name = Text::new(&wanted.name);
         world.migration = active.migration;
         let board = self.link.wall.make_board(snapshot_len(&world.scene));
-        let failed = |why: std::io::Error| Refusal::new(RefusalCode::SceneNotBuilt, format!("no memory to show it: {why}"));
+        let failed =
+            |why: std::io::Error| Refusal::new(RefusalCode::SceneNotBuilt, format!("no memory to show it: {why}"));
         world.shown = Some(board.map_err(failed)?);
         let source = Arc::new(source);
         let order = TissueOrder::World {
