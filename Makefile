@@ -11,7 +11,7 @@ COMPRESSED = --features stylet-files/compressed
 PACKAGED = $(COMPRESSED) --features host-ui/screen-reader
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: animation attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release reproducible sbom libraries package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures python python-test clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: wasm-test animation attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release reproducible sbom libraries package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures python python-test clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -73,6 +73,13 @@ report: ## Measure speed against error of every tissue model; writes benches/run
 
 seeds-oracle: ## Compare seeds, forces and motion of the gland with tests/oracles/seeds_at_rest.py in every case of docs/physics/needle-line.md
 	$(CARGO) test --profile quick -p stylet-runtime --lib by_another_method -- --ignored --nocapture
+
+WASM = $(abspath $(or $(CARGO_TARGET_DIR),target))/web
+
+wasm-test: ## Repeat a recording (FLIGHT=FILE), or measure a tick, as wasm with node and natively; needs rustc's wasm32-unknown-unknown
+	CARGO_TARGET_DIR="$(WASM)" $(CARGO) rustc --profile quick --target wasm32-unknown-unknown -p stylet-tests-wasm --lib --crate-type cdylib
+	node tests/wasm/run.mjs "$(WASM)/wasm32-unknown-unknown/quick/stylet_tests_wasm.wasm" $(FLIGHT)
+	$(CARGO) run --profile quick -p stylet-tests-wasm -- $(FLIGHT)
 
 causes: ## Inject ten causes of late ticks into measurements, and see which of them the trace names (as root, about a minute)
 	$(CARGO) build --profile quick --workspace --bin rt-core --bin stylet-bridge --bin stylet-lab
