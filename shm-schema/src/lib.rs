@@ -64,6 +64,7 @@ macro_rules! numbered {
     };
 }
 
+#[cfg(not(target_family = "wasm"))]
 pub mod affinity;
 pub mod check;
 mod class;
@@ -92,7 +93,9 @@ pub use command::{COMMAND_BYTES, Command, MARK_BYTES, MAX_REASONS, Reply, ReplyS
 pub use deadlines::DeadlineTotals;
 pub use event::{Event, EventKind};
 pub use exercise::{EXERCISE_STIFFNESS_RANGE, Exercise, ExercisesInForce, MOST_MOVED_M};
-pub use instance::{Attendance, Epoch, Instance, InstanceError, Owned};
+#[cfg(not(target_family = "wasm"))]
+pub use instance::{Attendance, Epoch, Owned};
+pub use instance::{Instance, InstanceError};
 pub use params::ParametersInForce;
 pub use plan::{
     MAX_EARLIER_NEEDLES, MAX_SEEDS, MOST_PLANNED_NEEDLES, PRESCRIPTION_RANGE_GY, PlanInForce, PlannedNeedle,

@@ -2,7 +2,6 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::{Error, Read};
-use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
 /// Reason why a file cannot be read; the texts follow the name of the file.
@@ -36,11 +35,10 @@ pub fn has_ending(path: &Path, ending: &str) -> bool {
 /// Returns a regular file and its size in bytes. Refuses a pipe at once, even one
 /// without a writer.
 pub fn open(path: &Path) -> Result<(File, u64), InputError> {
-    let file = OpenOptions::new()
-        .read(true)
-        .custom_flags(libc::O_NONBLOCK)
-        .open(path)
-        .map_err(InputError::Open)?;
+    let mut options = OpenOptions::new();
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, libc::O_NONBLOCK);
+    let file = options.read(true).open(path).map_err(InputError::Open)?;
     let about = file.metadata().map_err(InputError::Open)?;
     if !about.is_file() {
         return Err(InputError::NotRegular);

@@ -1,7 +1,9 @@
 //! Ctrl-C, termination requests and a closing terminal: the first asks for an orderly end, the
 //! second ends at once.
 
+#[cfg(unix)]
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+#[cfg(unix)]
 use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,6 +24,7 @@ impl Interrupt {
     /// # Errors
     ///
     /// If the handlers cannot be installed.
+    #[cfg(unix)]
     pub fn on_signals() -> Result<Self, InterruptError> {
         let interrupt = Self::default();
         let of_terminal = (!is_ignored(SIGHUP)).then_some(SIGHUP);
@@ -46,6 +49,7 @@ impl Interrupt {
     }
 }
 
+#[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     // SAFETY: all zero is a valid value, and the call only writes to it.
     unsafe {

@@ -1,4 +1,5 @@
-//! Work on a separate thread that reports its results as they arrive and can be cancelled.
+//! Work on a separate thread that reports its results as they arrive and can be cancelled. A web page has one thread
+//! and does such work at once.
 
 use crate::interrupt::Interrupt;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
@@ -25,12 +26,17 @@ impl<T: Send + 'static> Job<T> {
         let (sender, messages) = channel();
         let interrupt = Interrupt::default();
         let asked = interrupt.clone();
-        let spawned = std::thread::Builder::new()
-            .name(name.to_owned())
-            .spawn(move || work(&sender, &asked));
         // Without a thread the sender is dropped, and `poll` reports the end.
-        drop(spawned);
+        let _spawned = spawn(name, move || work(&sender, &asked));
         Self { messages, interrupt }
+    }
+
+    /// Creates a job whose messages come from elsewhere: from the event loop of a web page.
+    #[cfg(target_family = "wasm")]
+    pub fn elsewhere() -> (Sender<T>, Self) {
+        let (sender, messages) = channel();
+        let interrupt = Interrupt::default();
+        (sender, Self { messages, interrupt })
     }
 
     /// Returns the next message, if there is one. Never waits.
@@ -41,6 +47,20 @@ impl<T: Send + 'static> Job<T> {
             Err(TryRecvError::Disconnected) => JobUpdate::Ended,
         }
     }
+}
+
+/// Runs `work` on a thread of this name; in a web page, before this returns.
+///
+/// # Errors
+///
+/// If no thread can be started.
+pub fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    if cfg!(target_family = "wasm") {
+        work();
+        return Ok(());
+    }
+    let thread = std::thread::Builder::new().name(name.to_owned());
+    thread.spawn(work).map(drop)
 }
 
 /// Asks the thread to end, because its messages are no longer read.

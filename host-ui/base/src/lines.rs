@@ -4,7 +4,7 @@
 use std::io::Write;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use web_time::{Duration, Instant};
 
 /// Number of lines in the queue.
 const WAITING: usize = 256;

@@ -1,4 +1,6 @@
 //! Threads without real-time priority: those that answer hosts come before hosts and before long work.
+//!
+//! A core that is stepped has no threads: its long work is done at once.
 
 use std::io;
 use std::sync::Arc;
@@ -6,12 +8,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, JoinHandle};
 
 /// Nice value of the control thread and of the bridge: a stop must reach the loops while other hosts flood both.
+#[cfg(not(target_family = "wasm"))]
 const ANSWERING: i32 = -11;
 /// Nice value of long work, and of hosts as they come.
+#[cfg(not(target_family = "wasm"))]
 const ORDINARY: i32 = 0;
 
 /// Puts the calling thread before ordinary ones, if the user may do that. Threads and processes that it starts inherit
 /// this.
+#[cfg(not(target_family = "wasm"))]
 pub fn answer_first() {
     let _ = rustix::process::setpriority_process(None, ANSWERING);
 }
@@ -19,15 +24,30 @@ pub fn answer_first() {
 /// Starts long work on a thread of ordinary priority.
 pub fn spawn<T: Send + 'static>(name: &str, work: impl FnOnce() -> T + Send + 'static) -> io::Result<JoinHandle<T>> {
     Builder::new().name(name.to_owned()).spawn(|| {
+        #[cfg(not(target_family = "wasm"))]
         let _ = rustix::process::setpriority_process(None, ORDINARY);
         work()
     })
 }
 
+/// Where long work is done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Work {
+    /// On threads of ordinary priority.
+    Threads,
+    /// By the caller, before it goes on.
+    AtOnce,
+}
+
 /// Long work that ends early when it is dropped or told to stop.
 pub struct Task<T> {
-    thread: JoinHandle<T>,
+    work: Running<T>,
     stop: StopOnDrop,
+}
+
+enum Running<T> {
+    Thread(JoinHandle<T>),
+    Done(T),
 }
 
 struct StopOnDrop(Arc<AtomicBool>);
@@ -41,11 +61,14 @@ impl Drop for StopOnDrop {
 
 impl<T: Send + 'static> Task<T> {
     /// Starts work that polls whether to stop.
-    pub fn spawn(name: &str, work: impl FnOnce(&AtomicBool) -> T + Send + 'static) -> io::Result<Self> {
+    pub fn spawn(name: &str, place: Work, work: impl FnOnce(&AtomicBool) -> T + Send + 'static) -> io::Result<Self> {
         let stop = Arc::<AtomicBool>::default();
         let stopped = Arc::clone(&stop);
         Ok(Self {
-            thread: spawn(name, move || work(&stopped))?,
+            work: match place {
+                Work::Threads => Running::Thread(spawn(name, move || work(&stopped))?),
+                Work::AtOnce => Running::Done(work(&stopped)),
+            },
             stop: StopOnDrop(stop),
         })
     }
@@ -58,12 +81,18 @@ impl<T: Send + 'static> Task<T> {
 
     /// True once the work has ended.
     pub fn is_finished(&self) -> bool {
-        self.thread.is_finished()
+        match &self.work {
+            Running::Thread(thread) => thread.is_finished(),
+            Running::Done(_) => true,
+        }
     }
 
     /// Returns the result; `None` if the work panicked.
     pub fn result(self) -> Option<T> {
-        self.thread.join().ok()
+        match self.work {
+            Running::Thread(thread) => thread.join().ok(),
+            Running::Done(result) => Some(result),
+        }
     }
 }
 

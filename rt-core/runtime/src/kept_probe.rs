@@ -3,6 +3,7 @@
 //! Layout: `MAGIC`, SHA-256 of scene and answers, answers (postcard). Nothing is used before the digest is verified;
 //! answers of another wall and non-finite numbers are refused.
 
+#[cfg(not(target_family = "wasm"))]
 use crate::environment::user_folder;
 use crate::pieces;
 use sha2::{Digest, Sha256};
@@ -35,6 +36,7 @@ pub enum KeptError {
 }
 
 /// Returns `$XDG_CACHE_HOME/stylet/probes`, by default under `~/.cache`; `None` for a user without a home.
+#[cfg(not(target_family = "wasm"))]
 pub fn default_folder() -> Option<PathBuf> {
     Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("stylet/probes"))
 }

@@ -1,8 +1,10 @@
 //! Owners of an instance, hosts that find it, and its remains.
 
+use super::files::secure_folder;
 use super::*;
 use std::fs::Permissions;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::path::PathBuf;
 
 struct Swept(Instance);
 

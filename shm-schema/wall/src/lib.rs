@@ -11,6 +11,10 @@
 
 #![warn(missing_docs)]
 
+#[cfg(not(target_family = "wasm"))]
 pub mod board;
+#[cfg(not(target_family = "wasm"))]
 mod cells;
+pub mod kind;
+#[cfg(not(target_family = "wasm"))]
 pub mod packet;

@@ -2,12 +2,12 @@
 
 #![warn(missing_docs)]
 
-use std::fs::{File, Permissions};
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 /// Readable and writable for all, minus the umask, as for any new file.
+#[cfg(unix)]
 const MODE: u32 = 0o666;
 
 /// Failure to write a file.
@@ -61,9 +61,11 @@ fn streamed(path: &Path, write: impl FnOnce(&mut BufWriter<&mut File>) -> io::Re
         return fill(&mut File::options().write(true).open(&path)?);
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let mut file = tempfile::Builder::new()
-        .permissions(Permissions::from_mode(MODE))
-        .tempfile_in(folder.unwrap_or(Path::new(".")))?;
+    #[cfg_attr(not(unix), expect(unused_mut))]
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(MODE));
+    let mut file = builder.tempfile_in(folder.unwrap_or(Path::new(".")))?;
     fill(file.as_file_mut())?;
     file.persist(&path)?;
     Ok(())
@@ -72,6 +74,7 @@ fn streamed(path: &Path, write: impl FnOnce(&mut BufWriter<&mut File>) -> io::Re
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::unix::fs::PermissionsExt;
 
     fn names(folder: &Path) -> Vec<String> {
         let entries = std::fs::read_dir(folder).unwrap();

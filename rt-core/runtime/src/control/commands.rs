@@ -1,7 +1,6 @@
 //! Carries out the requests of hosts: as orders to the loops or as background work.
 
 use super::Control;
-use super::link::event_now;
 use super::second::Second;
 use super::wall::{Asked, MOST_PACKETS};
 use crate::rt::exchange::{HapticOrder, Moved, Ticket, TissueOrder, TissueStep, hand_order};
@@ -11,7 +10,7 @@ use stylet_shm_schema::{
 };
 use stylet_sim::active::activate;
 use stylet_sim::line::LeftNeedles;
-use stylet_wall::packet::Kind;
+use stylet_wall::kind::Kind;
 
 /// Slots of the force loop's ring reserved for requests that end a motion or a force.
 const KEPT_FOR_STOPS: usize = 16;
@@ -113,10 +112,7 @@ impl Control {
                 let (set, generation) = (this.parameters.in_force.set, this.scene.generation());
                 this.rehearsals.begin(ticket, run, set, generation)
             }),
-            Request::SaveFlight => {
-                let taken = self.flights.request(ticket);
-                taken.then_some(()).ok_or(RefusalCode::TooManyRequests.into())
-            }
+            Request::SaveFlight => self.save_flight(ticket),
             Request::Shutdown | Request::KeepMoving { .. } => Ok(()),
         }
     }
@@ -225,7 +221,7 @@ impl Control {
         self.order_all(ticket, HapticOrder::Reset, TissueStep::Reset)?;
         self.lines.forget_tracks();
         self.forget_exercises();
-        self.link.event(event_now(EventKind::Reset));
+        self.link.event(self.link.event_now(EventKind::Reset));
         Ok(())
     }
 }

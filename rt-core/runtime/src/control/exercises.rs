@@ -1,8 +1,7 @@
 //! Marks and instructor-injected faults, from the request to the broadcast event.
 
 use super::Control;
-use super::link::{event_at, event_now};
-use crate::rt::clock;
+use super::link::event_at;
 use crate::rt::exchange::{HapticOrder, Ticket};
 use stylet_shm_schema::{Event, EventKind, Exercise, ExercisesInForce, Mark, Refusal, RefusalCode, Text};
 
@@ -12,10 +11,11 @@ impl Control {
         // A host that marks has seen the loop's live state, which is newer than the records of the last pass.
         self.link.send_records(&mut self.loops.records);
         let newest = self.newest_tick().unwrap_or(0);
+        let now_ns = self.link.wall.now_ns();
         let tick = newest.saturating_sub(before_ns / self.link.session.period_ns.max(1));
         self.link.event(Event {
             text: Text::new(&mark.text),
-            ..event_at(EventKind::Mark, tick, clock::now_ns().saturating_sub(before_ns))
+            ..event_at(EventKind::Mark, tick, now_ns.saturating_sub(before_ns))
         });
         self.link.answer(ticket, Ok(tick));
     }
@@ -37,7 +37,7 @@ impl Control {
             code: exercise.number(),
             value: exercise.value(),
             text: Text::new(&exercise.to_string()),
-            ..event_now(EventKind::ExerciseBegun)
+            ..self.link.event_now(EventKind::ExerciseBegun)
         });
         Ok(())
     }
@@ -64,7 +64,7 @@ impl Control {
         self.lines.move_body([0.0; 3]);
         self.lines.stiffen(1.0);
         if std::mem::take(&mut self.link.session.exercises) != ExercisesInForce::default() {
-            self.link.event(event_now(EventKind::ExercisesEnded));
+            self.link.event(self.link.event_now(EventKind::ExercisesEnded));
         }
     }
 }

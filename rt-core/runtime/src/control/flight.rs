@@ -14,9 +14,9 @@ use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 /// Time recorded after a fault, to show how the force ramps out.
-const AFTER_FAULT: Duration = Duration::from_millis(300);
+const AFTER_FAULT_NS: u64 = 300_000_000;
 /// A loop that hands over no tape within this time is left out.
-const GATHER_LIMIT: Duration = Duration::from_secs(1);
+const GATHER_LIMIT_NS: u64 = 1_000_000_000;
 /// Most requests queued at once; more are refused.
 const QUEUE: usize = 4;
 /// Newest recordings of each kind kept in the folder.
@@ -57,14 +57,14 @@ struct Wanted {
     /// Kind of recording, part of the file name.
     kind: &'static str,
     reason: String,
-    due: Instant,
+    due_ns: u64,
     ticket: Option<Ticket>,
 }
 
 struct Gathering {
     kind: &'static str,
     ticket: Option<Ticket>,
-    since: Instant,
+    since_ns: u64,
     /// Tapes of the force loop, the tissue loop and the second device's loop that have come or need not come.
     has: [bool; 3],
     flight: Flight,
@@ -105,29 +105,24 @@ impl FlightKeeper {
 
     /// Queues a host's request; false when the queue is full.
     pub fn request(&mut self, ticket: Ticket) -> bool {
-        self.want(
-            "request",
-            "a host asked for it".to_owned(),
-            Instant::now(),
-            Some(ticket),
-        )
+        self.want("request", "a host asked for it".to_owned(), 0, Some(ticket))
     }
 
     /// Queues a recording of a fault.
-    pub fn fault(&mut self, message: &str) {
+    pub fn fault(&mut self, message: &str, now_ns: u64) {
         // A recording already queued covers this fault as well.
         if !self.queue.iter().any(|w| w.kind == "fault") {
-            self.want("fault", message.to_owned(), Instant::now() + AFTER_FAULT, None);
+            self.want("fault", message.to_owned(), now_ns + AFTER_FAULT_NS, None);
         }
     }
 
-    fn want(&mut self, kind: &'static str, reason: String, due: Instant, ticket: Option<Ticket>) -> bool {
+    fn want(&mut self, kind: &'static str, reason: String, due_ns: u64, ticket: Option<Ticket>) -> bool {
         let room = self.queue.len() < QUEUE;
         if room {
             self.queue.push_back(Wanted {
                 kind,
                 reason,
-                due,
+                due_ns,
                 ticket,
             });
         }
@@ -136,28 +131,33 @@ impl FlightKeeper {
 
     /// Runs one pass of the control thread; returns a recording written since the last. `hand_over` orders the tapes of
     /// all loops.
-    pub fn pass(&mut self, scene_generation: u64, lines: &LineArchive, hand_over: impl FnOnce()) -> Option<Saved> {
+    pub fn pass(
+        &mut self,
+        now_ns: u64,
+        scene_generation: u64,
+        lines: &LineArchive,
+        hand_over: impl FnOnce(),
+    ) -> Option<Saved> {
         self.take_tapes(scene_generation);
-        let is_over = |g: &mut Gathering| g.is_whole() || g.since.elapsed() > GATHER_LIMIT;
+        let is_over = |g: &mut Gathering| g.is_whole() || now_ns - g.since_ns > GATHER_LIMIT_NS;
         if let Some(gathering) = self.gathering.take_if(is_over) {
             self.write(gathering, lines);
         }
-        let now = Instant::now();
         if self.gathering.is_none()
-            && let Some(at) = self.queue.iter().position(|w| w.due <= now)
+            && let Some(at) = self.queue.iter().position(|w| w.due_ns <= now_ns)
             && let Some(wanted) = self.queue.remove(at)
         {
             hand_over();
-            self.gather(wanted.kind, wanted.reason, wanted.ticket);
+            self.gather(wanted.kind, wanted.reason, wanted.ticket, now_ns);
         }
         self.written.1.try_recv().ok()
     }
 
-    fn gather(&mut self, kind: &'static str, reason: String, ticket: Option<Ticket>) {
+    fn gather(&mut self, kind: &'static str, reason: String, ticket: Option<Ticket>, since_ns: u64) {
         self.gathering = Some(Gathering {
             kind,
             ticket,
-            since: Instant::now(),
+            since_ns,
             has: [false, false, self.second.is_none()],
             flight: Flight {
                 reason,
@@ -208,7 +208,7 @@ impl FlightKeeper {
 
     /// Saves the last recording, after all loops have ended and handed over their tapes.
     pub fn save_at_end(&mut self, scene_generation: u64, lines: &LineArchive) -> Result<PathBuf, SaveError> {
-        self.gather("exit", "rt-core ended".to_owned(), None);
+        self.gather("exit", "rt-core ended".to_owned(), None, 0);
         self.take_tapes(scene_generation);
         match self.gathering.take() {
             Some(gathering) if gathering.has[0] => self.save_now(gathering, lines),
@@ -225,7 +225,7 @@ impl FlightKeeper {
         reason: &str,
         limit: Duration,
     ) -> Result<PathBuf, SaveError> {
-        self.gather("fault", reason.to_owned(), None);
+        self.gather("fault", reason.to_owned(), None, 0);
         let begun = Instant::now();
         let is_over = |g: &mut Gathering| g.is_whole() || begun.elapsed() >= limit;
         loop {

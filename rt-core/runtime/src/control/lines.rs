@@ -1,30 +1,29 @@
 //! Prepares needle lines in the background while the needle is outside the tissue.
 //!
-//! A needle that stays on an axis for [`STEADY`] is expected to enter along it. The loops' line is replaced only once
-//! the needle has left its axis, and only while it is outside the tissue. In idle time the lines of the planned needle
-//! and of the one after it are solved ahead and kept until a needle arrives.
+//! A needle that stays on an axis for [`STEADY_NS`] is expected to enter along it. The loops' line is replaced only
+//! once the needle has left its axis, and only while it is outside the tissue. In idle time the lines of the planned
+//! needle and of the one after it are solved ahead and kept until a needle arrives.
 
 use super::line_archive::{Half, LineArchive};
-use crate::background::{Task, goes_on};
+use crate::background::{Task, Work, goes_on};
 use crate::lines::{LineBody, NoLine};
 use crate::rt::exchange::TissueOrder;
 use crate::rt::wiring::ControlPorts;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
 use stylet_shm_schema::{TickRecord, flags};
 use stylet_sim::line::{HandLine, Line, ReadyLine, Track};
 use stylet_sim::scene::SceneSource;
 use stylet_sim::tissue::TissueSpec;
 
 /// Time for which the needle must keep its axis before its line is solved.
-const STEADY: Duration = Duration::from_millis(60);
+const STEADY_NS: u64 = 60_000_000;
 /// Largest deviation of an axis, at its entry and in direction, that counts as the same.
 const SAME_M: f64 = 3e-4;
 const SAME_RAD: f64 = 5e-3;
 /// After this time a line that both loops have counts as in use, if the needle is on it.
-const IN_USE_AFTER: Duration = Duration::from_secs(1);
+const IN_USE_AFTER_NS: u64 = 1_000_000_000;
 
 /// Result of the solver thread.
 struct Finished {
@@ -46,11 +45,11 @@ pub struct LinePreparer {
     source: Arc<SceneSource>,
     /// Body of the running scene; `None` before the first line in it, and while a line is being solved.
     body: Option<(u64, LineBody)>,
-    /// Axis of the needle, and since when.
-    steady: Option<(Line, Instant)>,
+    /// Axis of the needle, and since when, ns.
+    steady: Option<(Line, u64)>,
     under_way: Option<(Line, Task<Finished>)>,
-    /// Axis of the line handed over last, and when.
-    handed_over: Option<(Line, Instant)>,
+    /// Axis of the line handed over last, and when, ns.
+    handed_over: Option<(Line, u64)>,
     /// Axes without a line: no tissue there, or none that can be solved for.
     without: Vec<Line>,
     /// The planned needle and the one after it.
@@ -67,10 +66,13 @@ pub struct LinePreparer {
     archive: LineArchive,
     /// Tracks cut since the tissue was reset, oldest first.
     tracks: Vec<Track>,
+    work: Work,
+    /// Time of this pass.
+    now_ns: u64,
 }
 
 impl LinePreparer {
-    pub fn new(source: Arc<SceneSource>, tissue: impl Into<TissueSpec>) -> Self {
+    pub fn new(source: Arc<SceneSource>, tissue: impl Into<TissueSpec>, work: Work) -> Self {
         Self {
             source,
             body: None,
@@ -87,6 +89,8 @@ impl LinePreparer {
             bends: false,
             archive: LineArchive::default(),
             tracks: Vec::new(),
+            work,
+            now_ns: 0,
         }
     }
 
@@ -172,13 +176,20 @@ impl LinePreparer {
     }
 
     /// Hands over a finished line, and begins one for a needle that has none.
-    pub(super) fn pass(&mut self, newest: Option<&TickRecord>, scene_generation: u64, loops: &mut ControlPorts) {
+    pub(super) fn pass(
+        &mut self,
+        now_ns: u64,
+        newest: Option<&TickRecord>,
+        scene_generation: u64,
+        loops: &mut ControlPorts,
+    ) {
+        self.now_ns = now_ns;
         while let Ok(line) = loops.old_hand_lines.pop() {
-            self.archive.returned(line.generation, Half::Hand);
+            self.archive.returned(line.generation, Half::Hand, now_ns);
             self.keep_track(&line);
         }
         while let Ok(line) = loops.old_body_lines.pop() {
-            self.archive.returned(line.generation, Half::Body);
+            self.archive.returned(line.generation, Half::Body, now_ns);
         }
         if !self.tissue.has_lines() {
             return;
@@ -216,15 +227,18 @@ impl LinePreparer {
             return None;
         }
         let axis = self.in_body(record.tip_in_scene_m, direction(record)?)?;
-        let now = Instant::now();
+        let now_ns = self.now_ns;
         match &self.steady {
             Some((since, _)) if same(since, &axis) => {}
-            _ => self.steady = Some((axis, now)),
+            _ => self.steady = Some((axis, now_ns)),
         }
-        let is_steady = self.steady.as_ref().is_some_and(|(_, since)| now - *since >= STEADY);
+        let is_steady = self
+            .steady
+            .as_ref()
+            .is_some_and(|(_, since)| now_ns - *since >= STEADY_NS);
         let has_line = self.handed_over.as_ref().is_some_and(|(given, since)| {
             let is_in_use = record.flags & flags::LINE_READY != 0;
-            same(given, &axis) && (is_in_use || now - *since < IN_USE_AFTER)
+            same(given, &axis) && (is_in_use || now_ns - *since < IN_USE_AFTER_NS)
         });
         (is_steady && !has_line && !self.has_none(&axis)).then_some(axis)
     }
@@ -285,7 +299,9 @@ impl LinePreparer {
             }
         };
         // The thread could not be started; the next pass tries again.
-        self.under_way = Task::spawn("needle-line", work).ok().map(|task| (axis, task));
+        self.under_way = Task::spawn("needle-line", self.work, work)
+            .ok()
+            .map(|task| (axis, task));
     }
 
     fn give_up(&mut self) {
@@ -329,11 +345,11 @@ impl LinePreparer {
             hand.open_track(track);
         }
         let source = hand.source().in_tissue_as_stiff(self.stiffness);
-        self.archive.keep(source, stations);
+        self.archive.keep(source, stations, self.now_ns);
         // The loops empty both rings every tick: a full ring belongs to a loop that has ended.
         let _ = loops.tissue_orders.push(TissueOrder::Line(body));
         let _ = loops.lines.push(hand);
-        self.handed_over = Some((axis, Instant::now()));
+        self.handed_over = Some((axis, self.now_ns));
     }
 }
 

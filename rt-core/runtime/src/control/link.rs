@@ -2,27 +2,21 @@
 
 use super::answers::{Answers, Asker};
 use super::wall::Wall;
-use crate::rt::clock;
 use crate::rt::exchange::Ticket;
 use stylet_shm_schema::{Event, EventKind, Refusal, Reply, Session, Text, TickRecord};
-use stylet_wall::packet::Kind;
+use stylet_wall::kind::Kind;
 
 const ANNOUNCE_NS: u64 = 200_000_000;
 
 /// Everything sent to the hosts.
 pub struct Link {
-    pub wall: Wall,
+    pub wall: Box<dyn Wall>,
     pub session: Session,
     pub answers: Answers,
     events: u64,
     announced_ns: u64,
     /// Why the bridge was last lost, until it is replaced.
     bridge_lost: Option<String>,
-}
-
-/// Returns an event that the control thread saw just now.
-pub fn event_now(kind: EventKind) -> Event {
-    event_at(kind, 0, clock::now_ns())
 }
 
 /// Returns an event that a loop saw at `tick`.
@@ -36,7 +30,7 @@ pub fn event_at(kind: EventKind, tick: u64, time_ns: u64) -> Event {
 }
 
 impl Link {
-    pub fn new(wall: Wall, session: Session) -> Self {
+    pub fn new(wall: Box<dyn Wall>, session: Session) -> Self {
         Self {
             wall,
             session,
@@ -45,6 +39,11 @@ impl Link {
             announced_ns: 0,
             bridge_lost: None,
         }
+    }
+
+    /// Returns an event that the control thread saw just now.
+    pub fn event_now(&self, kind: EventKind) -> Event {
+        event_at(kind, 0, self.wall.now_ns())
     }
 
     /// Serves the control thread and sends the heartbeat.
@@ -57,13 +56,13 @@ impl Link {
             eprintln!("rt-core: the bridge to the hosts is started anew: {why}");
             self.event(Event {
                 text: Text::new(&why),
-                ..event_now(EventKind::BridgeRestarted)
+                ..self.event_now(EventKind::BridgeRestarted)
             });
         }
         if self.wall.is_open() {
             self.bridge_lost = None;
         }
-        let now_ns = clock::now_ns();
+        let now_ns = self.wall.now_ns();
         if now_ns - self.announced_ns >= ANNOUNCE_NS {
             self.announced_ns = now_ns;
             self.session.time_ns = now_ns;
@@ -79,13 +78,12 @@ impl Link {
 
     /// Returns the newest record of the force loop.
     pub fn newest_record(&self) -> Option<&TickRecord> {
-        self.wall.records.newest()
+        self.wall.newest_record()
     }
 
     /// Takes the force loop's records and sends them in batches.
     pub fn send_records(&mut self, records: &mut rtrb::Consumer<TickRecord>) {
-        self.wall.records.take(records);
-        self.wall.send_records(false);
+        self.wall.take_records(records);
     }
 
     /// Sends an event of this run.
@@ -143,7 +141,7 @@ impl Link {
     pub fn report_invalid(&mut self, refusal: &Refusal) {
         self.event(Event {
             text: Text::new(&refusal.text),
-            ..event_now(EventKind::InvalidRefused)
+            ..self.event_now(EventKind::InvalidRefused)
         });
     }
 }

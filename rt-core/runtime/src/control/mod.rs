@@ -22,15 +22,15 @@ mod upload;
 mod wall;
 
 use crate::replay::file::Flight;
-use crate::rt::exchange::{HapticOrder, TissueOrder};
+use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
 use crate::rt::second::SecondControlPorts;
 use crate::rt::wiring::{ControlPorts, TapePorts};
 use flight::FlightKeeper;
 pub use flight::SaveError;
 use lines::LinePreparer;
-use link::{Link, event_now};
+use link::Link;
 use parameters::ParameterChanges;
-pub use picture::{ScenePicture, SnapshotBoard, snapshot_board};
+pub use picture::{ScenePicture, snapshot_len};
 use probe::ProbePreparer;
 use rehearsals::RehearsalRunner;
 use scenes::RunningScene;
@@ -42,10 +42,12 @@ use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{Event, EventKind, PlanInForce, Refusal, RefusalCode, Rehearsal, Session, Text};
 use stylet_sim::scene::SceneSource;
 use stylet_sim::tissue::TissueSpec;
-use stylet_wall::packet::Kind;
+use stylet_wall::kind::Kind;
 pub(crate) use supervisor::LOOP_ENDED;
 use supervisor::Supervisor;
-pub use wall::{BridgeError, Wall, watcher};
+pub use wall::{Asked, Desk, Here, Told, Wall};
+#[cfg(not(target_family = "wasm"))]
+pub use wall::{Bridge, BridgeError, watcher};
 
 const PASS: Duration = Duration::from_millis(2);
 
@@ -62,27 +64,23 @@ pub struct ControlSetup {
     pub session: Session,
     /// First scene, as sent to hosts.
     pub picture: ScenePicture,
-    /// Board of the first scene's snapshots.
-    pub snapshots: SnapshotBoard,
     /// Tissue model of every scene.
     pub tissue: TissueSpec,
     /// Source of the first scene.
     pub source: Arc<SceneSource>,
     /// Second device, if the run has one, and the ends of its rings.
     pub second: Option<(DeviceInfo, SecondControlPorts)>,
-    /// Folder of the flight recordings.
-    pub flight_folder: PathBuf,
     /// Folder of the saved probe answers.
     pub probe_folder: Option<PathBuf>,
-    /// Part common to every flight recording.
-    pub flight: Flight,
+    /// Folder of the flight recordings, and the part common to all; `None` in a run that keeps none.
+    pub flights: Option<(PathBuf, Flight)>,
 }
 
 /// State of the control thread.
 pub struct Control {
     link: Link,
     loops: ControlPorts,
-    flights: FlightKeeper,
+    flights: Option<FlightKeeper>,
     device: DeviceInfo,
     /// Tissue model of every scene of the run.
     tissue: TissueSpec,
@@ -102,21 +100,24 @@ pub struct Control {
 
 impl Control {
     /// Announces parameters and plan; the rest follows in [`run`](Self::run).
-    pub fn new(wall: Wall, loops: ControlPorts, (haptic, tissue): TapePorts, setup: ControlSetup) -> Self {
+    pub fn new(wall: Box<dyn Wall>, loops: ControlPorts, (haptic, tissue): TapePorts, setup: ControlSetup) -> Self {
         let session_id = setup.session.session_id;
         let is_real_time = setup.session.haptic.is_fifo();
         let mut plan: PlanInForce = bytemuck::Zeroable::zeroed();
         plan.session_id = session_id;
         let parameters = ParameterChanges::new(session_id);
+        let work = wall.work();
         let mut link = Link::new(wall, setup.session);
         link.wall.keep(Kind::Parameters, &parameters.in_force);
         link.wall.keep(Kind::Plan, &plan);
-        setup.picture.show(&mut link.wall, Some(setup.snapshots));
+        setup.picture.show(link.wall.as_mut());
         let (second, second_tapes) = setup.second.map(|second| Second::new(second, is_real_time)).unzip();
         let tapes = (haptic, tissue, second_tapes);
         Self {
             link,
-            flights: FlightKeeper::new(tapes, setup.flight_folder, setup.flight),
+            flights: setup
+                .flights
+                .map(|(folder, common)| FlightKeeper::new(tapes, folder, common)),
             loops,
             device: setup.device,
             tissue: setup.tissue,
@@ -125,9 +126,9 @@ impl Control {
             scene: RunningScene::new(setup.picture),
             probe: second
                 .is_some()
-                .then(|| ProbePreparer::new(Arc::clone(&setup.source), setup.tissue, setup.probe_folder)),
-            lines: LinePreparer::new(Arc::clone(&setup.source), setup.tissue),
-            rehearsals: RehearsalRunner::new(setup.source, setup.tissue, setup.device),
+                .then(|| ProbePreparer::new(Arc::clone(&setup.source), setup.tissue, setup.probe_folder, work)),
+            lines: LinePreparer::new(Arc::clone(&setup.source), setup.tissue, work),
+            rehearsals: RehearsalRunner::new(setup.source, setup.tissue, setup.device, work),
             left_rooms: (false, None),
             supervisor: Supervisor::new(is_real_time, setup.device.simulated),
             second,
@@ -158,17 +159,18 @@ impl Control {
     /// force loop's own tape is missing unless the loop resumes in time.
     pub fn save_flight_of_stopped(&mut self, limit: Duration) -> Result<PathBuf, SaveError> {
         let generation = self.scene.generation();
-        self.flights
-            .save_stopped(generation, self.lines.archive(), LOOP_ENDED, limit)
+        let flights = self.flights.as_mut().ok_or(SaveError::NothingRecorded)?;
+        flights.save_stopped(generation, self.lines.archive(), LOOP_ENDED, limit)
     }
 
     /// Writes the last recording, after both loops have ended.
     pub fn save_last_flight(&mut self) -> Result<PathBuf, SaveError> {
-        self.flights.save_at_end(self.scene.generation(), self.lines.archive())
+        let flights = self.flights.as_mut().ok_or(SaveError::NothingRecorded)?;
+        flights.save_at_end(self.scene.generation(), self.lines.archive())
     }
 
     /// Runs one pass; true when a host asked to end.
-    fn pass(&mut self) -> Result<bool, LoopStopped> {
+    pub(crate) fn pass(&mut self) -> Result<bool, LoopStopped> {
         self.link.announce();
         let before = self.newest_tick();
         let end = self.take_commands();
@@ -181,7 +183,9 @@ impl Control {
         self.pass_second();
         self.serve_flights();
         let generation = self.scene.generation();
-        self.lines.pass(self.link.newest_record(), generation, &mut self.loops);
+        let now_ns = self.link.wall.now_ns();
+        let newest = self.link.newest_record();
+        self.lines.pass(now_ns, newest, generation, &mut self.loops);
         self.serve_probe(generation);
         self.supervise(made_a_tick)?;
         Ok(end)
@@ -198,10 +202,25 @@ impl Control {
         }
     }
 
+    /// Queues a recording for a host.
+    fn save_flight(&mut self, ticket: Ticket) -> Result<(), Refusal> {
+        let none = || Refusal::new(RefusalCode::FlightNotSaved, "this core keeps no flight recordings");
+        let taken = self.flights.as_mut().ok_or_else(none)?.request(ticket);
+        taken.then_some(()).ok_or(RefusalCode::TooManyRequests.into())
+    }
+
+    /// Queues a recording of a fault.
+    fn fault_flight(&mut self, message: &str) {
+        if let Some(flights) = &mut self.flights {
+            flights.fault(message, self.link.wall.now_ns());
+        }
+    }
+
     fn serve_flights(&mut self) {
-        let generation = self.scene.generation();
+        let Some(flights) = &mut self.flights else { return };
+        let (generation, now_ns) = (self.scene.generation(), self.link.wall.now_ns());
         let (loops, second) = (&mut self.loops, &mut self.second);
-        let saved = self.flights.pass(generation, self.lines.archive(), || {
+        let saved = flights.pass(now_ns, generation, self.lines.archive(), || {
             // A ring that is full leaves its loop out.
             let _ = loops.haptic_orders.push((0, HapticOrder::HandOverTape));
             let _ = loops.tissue_orders.push(TissueOrder::HandOverTape);
@@ -218,7 +237,7 @@ impl Control {
         self.link.event(Event {
             code,
             text: Text::new(&text),
-            ..event_now(EventKind::FlightSaved)
+            ..self.link.event_now(EventKind::FlightSaved)
         });
         if let Some(ticket) = saved.ticket {
             let refusal = result.err().map(|why| Refusal::new(RefusalCode::FlightNotSaved, why));

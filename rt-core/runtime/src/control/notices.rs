@@ -35,7 +35,7 @@ impl Control {
             Notice::Refused { ticket, why } => self.link.answer(ticket, Err(&why.into())),
             Notice::Event { tick, time_ns, what } => {
                 if let Happened::Fault(fault) = what {
-                    self.flights.fault(fault.message());
+                    self.fault_flight(fault.message());
                 }
                 // The supervisor has already reported a loop that stopped.
                 if what != Happened::Fault(Fault::LoopStopped) {

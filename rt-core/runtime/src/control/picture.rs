@@ -1,21 +1,13 @@
 //! Geometry that hosts need to draw a scene and to plan in it.
 
 use super::wall::Wall;
-use std::os::fd::OwnedFd;
 use stylet_anatomy::PatientFrame;
 use stylet_shm_schema::*;
 use stylet_sim::scene::{Role, Scene, Structure, label_grid};
-use stylet_wall::board::Writer;
-use stylet_wall::packet::{BoardSize, Kind, sealed};
 
-/// Board of a scene's snapshots.
-pub type SnapshotBoard = (BoardSize, OwnedFd);
-
-/// Makes a board for the snapshots of `scene`: one end for its tissue loop, one for the control thread.
-pub fn snapshot_board(scene: &Scene) -> std::io::Result<(Writer<SnapshotHeader, Vertex>, SnapshotBoard)> {
-    let len = scene.surface.vertex_elements.len() + scene.nodes.elements.len();
-    let (writer, memory) = Writer::new("stylet-snapshots", len)?;
-    Ok((writer, (BoardSize { len: len as u64 }, memory)))
+/// Number of vertices and nodes in each snapshot of `scene`.
+pub fn snapshot_len(scene: &Scene) -> usize {
+    scene.surface.vertex_elements.len() + scene.nodes.elements.len()
 }
 
 /// Header and words of the scene service.
@@ -40,15 +32,9 @@ impl ScenePicture {
         self.words.len()
     }
 
-    /// Shows the picture to hosts, with the board of its snapshots if that is new.
-    pub(super) fn show(&self, wall: &mut Wall, snapshots: Option<SnapshotBoard>) {
-        if let Some((size, board)) = snapshots {
-            wall.keep_with(Kind::Snapshots, bytemuck::bytes_of(&size), Some(board));
-        }
-        match sealed("stylet-scene", &self.words) {
-            Ok(words) => wall.keep_with(Kind::Scene, bytemuck::bytes_of(&self.header), Some(words)),
-            Err(why) => eprintln!("rt-core: the scene cannot be shown: {why}"),
-        }
+    /// Shows the picture to hosts, with the board of its snapshots.
+    pub(super) fn show(&self, wall: &mut dyn Wall) {
+        wall.show_scene(&self.header, &self.words);
     }
 
     pub(super) fn of(scene: &Scene, session_id: u64, generation: u64, patient: PatientFrame) -> Self {

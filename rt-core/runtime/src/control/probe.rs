@@ -1,7 +1,7 @@
 //! Solves in the background for the answers of the ultrasound probe, once per scene of a run whose second hand holds
 //! it.
 
-use crate::background::{Task, goes_on};
+use crate::background::{Task, Work, goes_on};
 use crate::lines::{LineBody, NoProbe};
 use crate::rt::exchange::TissueOrder;
 use crate::rt::outside::OutsideTape;
@@ -28,10 +28,11 @@ pub struct ProbePreparer {
     is_settled: bool,
     /// The force loop has room to record the probe's effect on its line.
     has_sent_room: bool,
+    work: Work,
 }
 
 impl ProbePreparer {
-    pub fn new(source: Arc<SceneSource>, tissue: TissueSpec, kept_in: Option<PathBuf>) -> Self {
+    pub fn new(source: Arc<SceneSource>, tissue: TissueSpec, kept_in: Option<PathBuf>, work: Work) -> Self {
         Self {
             source,
             tissue,
@@ -39,6 +40,7 @@ impl ProbePreparer {
             under_way: None,
             is_settled: false,
             has_sent_room: false,
+            work,
         }
     }
 
@@ -91,7 +93,9 @@ impl ProbePreparer {
             find(&body, &source, kept_in.as_deref(), &mut |_| goes_on(stop))
         };
         // The thread could not be started; the next pass tries again.
-        self.under_way = Task::spawn("probe", work).ok().map(|task| (scene_generation, task));
+        self.under_way = Task::spawn("probe", self.work, work)
+            .ok()
+            .map(|task| (scene_generation, task));
     }
 }
 

@@ -1,11 +1,11 @@
 //! Runs rehearsals for hosts: one at a time, in the background, while the scene keeps running.
 
-use crate::background::Task;
+use crate::background::{Task, Work};
 use crate::rehearse::{RehearseError, Rehearsed, Stage};
+use crate::rt::clock;
 use crate::rt::exchange::Ticket;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{MAX_SEEDS, NeedleRehearsal, ParameterSet, Refusal, RefusalCode, Rehearsal};
 use stylet_sim::scene::SceneSource;
@@ -33,17 +33,19 @@ pub struct RehearsalRunner {
     source: Arc<SceneSource>,
     tissue: TissueSpec,
     device: DeviceInfo,
+    work: Work,
     /// Body of the running scene; `None` before its first rehearsal, and while one runs.
     stage: Option<(u64, Stage)>,
     under_way: Option<(Ticket, Task<Finished>)>,
 }
 
 impl RehearsalRunner {
-    pub fn new(source: Arc<SceneSource>, tissue: TissueSpec, device: DeviceInfo) -> Self {
+    pub fn new(source: Arc<SceneSource>, tissue: TissueSpec, device: DeviceInfo, work: Work) -> Self {
         Self {
             source,
             tissue,
             device,
+            work,
             stage: None,
             under_way: None,
         }
@@ -76,9 +78,9 @@ impl RehearsalRunner {
             let (stage, outcome, wall_ns) = match stage {
                 Ok(mut stage) => {
                     stage.seeds_and_forces_alone();
-                    let begun = Instant::now();
+                    let begun_ns = clock::now_ns();
                     let outcome = stage.rehearse(&run, &set, stop);
-                    (Some(stage), outcome, begun.elapsed().as_nanos() as u64)
+                    (Some(stage), outcome, clock::now_ns() - begun_ns)
                 }
                 Err(why) => (None, Err(why), 0),
             };
@@ -89,7 +91,7 @@ impl RehearsalRunner {
                 stage,
             }
         };
-        let task = Task::spawn("rehearsal", work);
+        let task = Task::spawn("rehearsal", self.work, work);
         let failed = |_| Refusal::new(RefusalCode::Internal, "no thread could be started to rehearse");
         self.under_way = Some((ticket, task.map_err(failed)?));
         Ok(())

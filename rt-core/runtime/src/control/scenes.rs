@@ -1,8 +1,7 @@
 //! Takes a scene from the host's request until it runs.
 
 use super::answers::Asker;
-use super::link::event_now;
-use super::picture::{ScenePicture, SnapshotBoard, snapshot_board};
+use super::picture::{ScenePicture, snapshot_len};
 use super::{Control, upload};
 use crate::background::Task;
 use crate::rt::exchange::{Ticket, TissueOrder};
@@ -14,7 +13,7 @@ use stylet_anatomy::PatientFrame;
 use stylet_shm_schema::{BUILTIN_SCENES, Event, EventKind, ProblemList, Refusal, RefusalCode, Text, UploadHeader};
 use stylet_sim::active::activate;
 use stylet_sim::scene::{Scene, SceneSource};
-use stylet_wall::packet::Kind;
+use stylet_wall::kind::Kind;
 
 /// A requested scene.
 pub(super) struct Wanted {
@@ -30,7 +29,6 @@ pub(super) struct NextScene {
     ticket: Ticket,
     picture: ScenePicture,
     source: Arc<SceneSource>,
-    snapshots: SnapshotBoard,
 }
 
 /// The running scene, as sent to hosts, and the one that follows it.
@@ -109,7 +107,10 @@ impl Control {
         }
         let work = move |_: &AtomicBool| build().map(|(scene, source)| (Box::new(scene), source));
         let failed = |_| Refusal::new(RefusalCode::Internal, "no thread could be started to load the scene");
-        self.scene.loading = Some((wanted, Task::spawn("scene-loader", work).map_err(failed)?));
+        self.scene.loading = Some((
+            wanted,
+            Task::spawn("scene-loader", self.link.wall.work(), work).map_err(failed)?,
+        ));
         Ok(())
     }
 
@@ -134,9 +135,10 @@ impl Control {
         let mut picture = ScenePicture::of(&world.scene, session_id, generation, wanted.patient);
         picture.header.name = Text::new(&wanted.name);
         world.migration = active.migration;
-        let (writer, snapshots) = snapshot_board(&world.scene)
-            .map_err(|why| Refusal::new(RefusalCode::SceneNotBuilt, format!("no memory to show it: {why}")))?;
-        world.shown = Some(writer);
+        let board = self.link.wall.make_board(snapshot_len(&world.scene));
+        let failed =
+            |why: std::io::Error| Refusal::new(RefusalCode::SceneNotBuilt, format!("no memory to show it: {why}"));
+        world.shown = Some(board.map_err(failed)?);
         let source = Arc::new(source);
         let order = TissueOrder::World {
             ticket: wanted.ticket,
@@ -151,7 +153,6 @@ impl Control {
             ticket: wanted.ticket,
             picture,
             source,
-            snapshots,
         });
         Ok(())
     }
@@ -167,7 +168,7 @@ impl Control {
             probe.change_scene(Arc::clone(&next.source));
         }
         self.rehearsals.change_scene(next.source);
-        self.scene.picture.show(&mut self.link.wall, Some(next.snapshots));
+        self.scene.picture.show(self.link.wall.as_mut());
         self.plan = bytemuck::Zeroable::zeroed();
         self.plan.session_id = self.link.session.session_id;
         self.link.wall.keep(Kind::Plan, &self.plan);
@@ -175,7 +176,7 @@ impl Control {
             code: self.scene.generation() as u32,
             tick,
             text: Text::new(&self.scene.picture.header.name.read()),
-            ..event_now(EventKind::SceneLoaded)
+            ..self.link.event_now(EventKind::SceneLoaded)
         });
     }
 }

@@ -1,7 +1,7 @@
 //! The control thread's side of the second device: orders to its loop, records and faults to the hosts.
 
 use super::Control;
-use super::link::{Link, event_now};
+use super::link::Link;
 use super::notices::event_of;
 use super::supervisor::Supervisor;
 use crate::rt::exchange::{Happened, HapticOrder, Moved, Notice, Ticket, hand_order};
@@ -41,13 +41,13 @@ impl Second {
 
     /// Sends records to the hosts, and reports a stopped loop. The needle's loop continues.
     fn pass(&mut self, link: &mut Link) {
-        let made_a_tick = link.wall.second_records.take(&mut self.records);
+        let made_a_tick = link.wall.take_second_records(&mut self.records);
         let stands_still = self.supervisor.pass(made_a_tick);
         if stands_still && !std::mem::replace(&mut self.has_stopped, stands_still) {
             link.event(Event {
                 code: Fault::LoopStopped as u32,
                 text: Text::new("the loop of the second device has stopped; the needle's goes on"),
-                ..event_now(EventKind::SecondFaultRaised)
+                ..link.event_now(EventKind::SecondFaultRaised)
             });
         }
         self.has_stopped &= !made_a_tick;
@@ -73,7 +73,7 @@ impl Control {
                 let mut event = event_of(what, tick, time_ns);
                 match what {
                     Happened::Fault(fault) => {
-                        self.flights.fault(&format!("the second device: {}", fault.message()));
+                        self.fault_flight(&format!("the second device: {}", fault.message()));
                         event.kind = EventKind::SecondFaultRaised as u32;
                     }
                     Happened::Rearmed => event.kind = EventKind::SecondRearmed as u32,

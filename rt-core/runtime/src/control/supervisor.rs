@@ -4,7 +4,6 @@
 //! motors the process ends, and the device's own watchdog, or the closing of its port, removes the force. A simulated
 //! device has no motors: the fault is reported, and the run continues with the force off when the loop resumes.
 
-use super::link::event_now;
 use super::{Control, LoopStopped};
 use crate::rt::exchange::HapticOrder;
 use stylet_shm_schema::{Event, EventKind, Fault, Text};
@@ -68,7 +67,7 @@ impl Control {
             self.link.event(Event {
                 code: Fault::LoopStopped as u32,
                 text: Text::new(text),
-                ..event_now(EventKind::FaultRaised)
+                ..self.link.event_now(EventKind::FaultRaised)
             });
             if !self.supervisor.is_simulated {
                 return Err(LoopStopped);

@@ -3,18 +3,17 @@
 mod motion;
 
 use crate::rt::arm::{self, Ask};
+pub use crate::start::{needle_start, second_start};
 use clap::Args;
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use stylet_anatomy::Organ;
 use stylet_hw::backend::{self, BackendKind, UnknownBackend};
 use stylet_hw::{
     Arm, ArmError, Axes, Device, ForceDimension, ForceDimensionConfig, Haply, HaplyConfig, Phantom, PhantomConfig,
     Placement, Report, SimulatedPhantom, SimulatedPhantomConfig, drd, haply, libhd,
 };
 use stylet_shm_schema::ThreadReport;
-use stylet_sim::scene::Scene;
 
 /// Rate of a driver's servo loop.
 const SERVO_HZ: u32 = 1000;
@@ -109,38 +108,6 @@ pub enum DeviceError {
     /// The recorded motion.
     #[error(transparent)]
     Motion(#[from] motion::MotionError),
-}
-
-/// Distance outside the body at which a hand begins, m.
-const BEFORE_BODY_M: f64 = 0.03;
-
-/// Start of the hand with the needle: outside the body and below the target.
-pub fn needle_start(scene: &Scene) -> Vector3<f64> {
-    let (lower, upper) = scene.target_bounds_m();
-    Vector3::new(
-        (lower[0] + upper[0]) / 2.0,
-        (lower[1] + upper[1]) / 2.0,
-        before_body(scene),
-    )
-}
-
-/// Start of the other hand: outside the body and below the rectum; in a scene without one, behind the target.
-pub fn second_start(scene: &Scene) -> Vector3<f64> {
-    let is_rectum = |name: &str| matches!(Organ::of_name(name), Some(Organ::Rectum | Organ::RectalWall));
-    let extents = scene.lattice.extents(scene.structures.len());
-    let rectum = scene.structures.iter().zip(&extents).find(|(s, _)| is_rectum(&s.name));
-    let z = before_body(scene);
-    if let Some((_, extent)) = rectum {
-        let middle = |axis: usize| (extent.lower_m[axis] + extent.upper_m[axis]) / 2.0;
-        return Vector3::new(middle(0), middle(1), z);
-    }
-    let (lower, upper) = scene.target_bounds_m();
-    Vector3::new((lower[0] + upper[0]) / 2.0, lower[1] - BEFORE_BODY_M, z)
-}
-
-fn before_body(scene: &Scene) -> f64 {
-    let (lowest, _) = scene.lattice.bounds_m();
-    lowest[2] - BEFORE_BODY_M
 }
 
 /// Opens the device with its tip, or the origin of its frame, at `start`. `force_loop` is the loop's scheduling
@@ -274,18 +241,6 @@ mod tests {
             ("force-dimension", "haply"),
         ] {
             assert!(!excludes(a, b), "{a} {b}");
-        }
-    }
-
-    #[test]
-    fn the_other_hand_begins_below_the_rectum_or_behind_the_target() {
-        for name in ["paper", "pelvis"] {
-            let scene = Scene::builtin(name).expect("built in");
-            let (needle, other) = (needle_start(&scene), second_start(&scene));
-            assert!(
-                other.y < needle.y - 0.02 && other.z == needle.z,
-                "{name}: {needle} {other}"
-            );
         }
     }
 }

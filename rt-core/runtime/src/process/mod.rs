@@ -184,7 +184,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
         affinity::keep_off(core);
     }
     background::answer_first();
-    let setup = Setup::new(options)?;
+    let mut setup = Setup::new(options)?;
     let kernel = setup::lock_memory(options)?;
     let (session_id, info, second_info) = (setup.session_id, setup.info, setup.second_info);
     let is_watched = Arc::default();
@@ -198,20 +198,21 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
     let devices = (&info, second_info.as_ref());
     let session = session::session(options, session_id, devices, &threads, kernel.unlocked.as_deref());
     let mut control = Control::new(
-        wall,
+        Box::new(wall),
         loops.control,
         loops.tapes,
         ControlSetup {
             device: info,
             session,
             picture: setup.picture,
-            snapshots: setup.snapshots,
             tissue: options.tissue,
             source: setup.source,
             second: second_info.zip(second_ports),
-            flight_folder: options.flight_folder.clone(),
             probe_folder: options.probe_folder.clone(),
-            flight: session::flight(options, session_id, devices),
+            flights: Some((
+                options.flight_folder.clone(),
+                session::flight(options, session_id, devices),
+            )),
         },
     );
     // SYNC: set by a signal handler; nothing but the flag is carried.

@@ -1,7 +1,7 @@
 //! Prepares a run before its threads start: scene, device, shared memory, locked memory, and both loops.
 
 use super::{Options, RunError, SecondOptions};
-use crate::control::{ScenePicture, SnapshotBoard, Wall, snapshot_board};
+use crate::control::{Bridge, ScenePicture, Wall, snapshot_len};
 use crate::device;
 use crate::rt::arm::{self, Ask, CoresAwake};
 use crate::rt::clock::{self, TISSUE_PERIOD_NS, TISSUE_PHASE, Wait};
@@ -28,7 +28,6 @@ pub(super) struct Setup {
     pub info: DeviceInfo,
     pub second_info: Option<DeviceInfo>,
     pub picture: ScenePicture,
-    pub snapshots: SnapshotBoard,
     pub source: Arc<SceneSource>,
     pub bodies: Bodies,
 }
@@ -84,16 +83,13 @@ impl Setup {
         let info = device.info();
         let active = activate(&ParameterSet::default(), &info)?;
         let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
-        let mut world = Box::new(World::new(scene, options.tissue, active.limits.clone(), 1)?);
+        let world = Box::new(World::new(scene, options.tissue, active.limits.clone(), 1)?);
         let picture = ScenePicture::first(&world.scene, session_id);
-        let (writer, snapshots) = snapshot_board(&world.scene).map_err(RunError::Board)?;
-        world.shown = Some(writer);
         Ok(Self {
             session_id,
             info,
             second_info: second.as_ref().map(|second| second.info()),
             picture,
-            snapshots,
             source: Arc::new(SceneSource::Builtin(options.scene.clone())),
             bodies: Bodies {
                 device,
@@ -105,17 +101,19 @@ impl Setup {
     }
 
     /// Makes the boards and starts the bridge.
-    pub fn show(&self, owned: Owned, is_watched: &Arc<AtomicBool>) -> Result<(Wall, Boards), RunError> {
+    pub fn show(&mut self, owned: Owned, is_watched: &Arc<AtomicBool>) -> Result<(Bridge, Boards), RunError> {
         let (state, memory) = Writer::new("stylet-state", 0).map_err(RunError::Board)?;
         let second = self.second_info.map(|_| Writer::new("stylet-second-state", 0));
         let (second_state, second_memory) = second.transpose().map_err(RunError::Board)?.unzip();
+        let snapshot_len = snapshot_len(&self.bodies.world.scene);
         let start = Start {
             session_id: self.session_id,
-            snapshot_len: self.snapshots.0.len,
+            snapshot_len: snapshot_len as u64,
             word_count: self.picture.word_count() as u64,
             has_second: u64::from(self.second_info.is_some()),
         };
-        let wall = Wall::new(owned, start, (memory, second_memory), Arc::clone(is_watched))?;
+        let mut wall = Bridge::new(owned, start, (memory, second_memory), Arc::clone(is_watched))?;
+        self.bodies.world.shown = Some(wall.make_board(snapshot_len).map_err(RunError::Board)?);
         Ok((wall, (state, second_state)))
     }
 }

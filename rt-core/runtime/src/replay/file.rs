@@ -1,5 +1,6 @@
 //! A flight recording on disk: magic, SHA-256 of the rest, and the recording itself.
 
+#[cfg(not(target_family = "wasm"))]
 use crate::environment::user_folder;
 use crate::pieces;
 use crate::rt::haptic_tape::HapticFlight;
@@ -116,10 +117,15 @@ impl Flight {
         if size > MAX_BYTES {
             return Err(failed(Problem::TooLarge));
         }
-        let bytes = std::fs::read(path).map_err(io)?;
+        Self::of_bytes(&std::fs::read(path).map_err(io)?, path)
+    }
+
+    /// As [`read`](Self::read), of the bytes of a file; errors name it `path`.
+    pub fn of_bytes(bytes: &[u8], path: &Path) -> Result<Self, FlightError> {
+        let failed = |problem| FlightError::new(path, problem);
         let rest = bytes
             .strip_prefix(MAGIC.as_slice())
-            .ok_or_else(|| failed(other_format(&bytes)))?;
+            .ok_or_else(|| failed(other_format(bytes)))?;
         let (digest, body) = rest.split_at_checked(DIGEST).ok_or_else(|| failed(Problem::CutShort))?;
         if Sha256::digest(body).as_slice() != digest {
             return Err(failed(Problem::Damaged));
@@ -138,6 +144,7 @@ fn other_format(bytes: &[u8]) -> Problem {
 }
 
 /// Returns the default folder of the recordings: `$XDG_STATE_HOME/stylet/flights`, by default under `~/.local/state`.
+#[cfg(not(target_family = "wasm"))]
 pub fn default_folder() -> PathBuf {
     let state = user_folder("XDG_STATE_HOME", ".local/state");
     state.unwrap_or_else(std::env::temp_dir).join("stylet/flights")

@@ -104,8 +104,28 @@ fn without_times(record: &TickRecord) -> TickRecord {
     }
 }
 
+/// A repeated output, beside which the recording has its own.
+#[derive(Clone, Copy, Debug)]
+pub enum Again<'a> {
+    /// Record of a tick of the force loop, counted from the start of the recording.
+    Record(usize, &'a TickRecord),
+    /// Response of a tick of the tissue loop.
+    Response(usize, &'a TissueResponse),
+    /// Displacement of an element, m: recorded and repeated.
+    Displacement([f64; 3], [f64; 3]),
+}
+
 /// Repeats the haptic chain: forces, phases, faults and flags of each tick, on needle lines as well.
 pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, RepeatError> {
+    haptic_seen(flight, recorded, &mut |_| {})
+}
+
+/// As [`haptic`]; `see` gets each record.
+pub fn haptic_seen(
+    flight: &Flight,
+    recorded: &HapticFlight,
+    see: &mut dyn FnMut(Again),
+) -> Result<Repeated, RepeatError> {
     let tape = Box::new(HapticTape::new(&recorded.memory));
     let Wiring {
         haptic: ports,
@@ -152,7 +172,11 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
         again.tick(entry.record.due_ns, entry.woke_ns, entry.record.missed);
         while control.haptic_notices.pop().is_ok() {}
         while control.old_hand_lines.pop().is_ok() {}
-        found.count(index, control.records.pop().is_ok_and(|record| is_same(&record, entry)));
+        let record = control.records.pop();
+        if let Ok(record) = &record {
+            see(Again::Record(index, record));
+        }
+        found.count(index, record.is_ok_and(|record| is_same(&record, entry)));
     }
     Ok(found)
 }
@@ -223,7 +247,17 @@ pub enum RepeatError {
 
 /// Repeats the tissue chain: response and held element of each tick, and every element's position at each checkpoint.
 /// `lines` comes from [`solve_again`](super::lines::solve_again).
-pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -> Result<Repeated, RepeatError> {
+pub fn tissue(flight: &Flight, recorded: &TissueFlight, lines: LinesAgain) -> Result<Repeated, RepeatError> {
+    tissue_seen(flight, recorded, lines, &mut |_| {})
+}
+
+/// As [`tissue`]; `see` gets each response, and each displacement at the checkpoints.
+pub fn tissue_seen(
+    flight: &Flight,
+    recorded: &TissueFlight,
+    mut lines: LinesAgain,
+    see: &mut dyn FnMut(Again),
+) -> Result<Repeated, RepeatError> {
     let scene = recorded.scene.build()?;
     let world = || World::new(scene.clone(), recorded.tissue, recorded.memory.limits.clone(), 1).map(Box::new);
     let reference = world()?;
@@ -268,7 +302,7 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
     let mut probe = recorded.probe.iter().peekable();
     for (index, entry) in recorded.ticks.iter().enumerate() {
         if let Some((_, memory)) = recorded.middle.as_ref().filter(|(tick, _)| *tick == index as u64) {
-            compare.positions(&again, memory);
+            compare.positions(&again, memory, see);
         }
         for order in at(&mut orders, index) {
             let _ = control.tissue_orders.push(order_of(order, &mut lines)?);
@@ -284,11 +318,12 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
         again.tick(entry.woke_ns);
         while control.tissue_notices.pop().is_ok() {}
         while control.old_body_lines.pop().is_ok() {}
+        see(Again::Response(index, again.response()));
         compare
             .found
             .count(index, same_step(&again, entry) && is_pressed_so(&again, pressed));
     }
-    compare.positions(&again, &recorded.end);
+    compare.positions(&again, &recorded.end, see);
     Ok(compare.found)
 }
 
@@ -341,7 +376,7 @@ struct Bodies {
 }
 
 impl Bodies {
-    fn positions(&mut self, again: &TissueLoop, recorded: &TissueMemory) {
+    fn positions(&mut self, again: &TissueLoop, recorded: &TissueMemory, see: &mut dyn FnMut(Again)) {
         if recorded.probe.is_there && again.probe_memory() != recorded.probe {
             self.found.different_positions += 1;
         }
@@ -350,7 +385,9 @@ impl Bodies {
         let bits = |u: [f64; 3]| u.map(f64::to_bits);
         for element in 0..then.lattice.element_count() as u32 {
             self.found.positions += 1;
-            if bits(then.displacement(element)) != bits(now.displacement(element)) {
+            let [then_m, now_m] = [&then, &now].map(|body| body.displacement(element));
+            see(Again::Displacement(then_m, now_m));
+            if bits(then_m) != bits(now_m) {
                 self.found.different_positions += 1;
             }
         }

@@ -1,6 +1,13 @@
 //! `CLOCK_MONOTONIC`, and a sleep until an absolute time on it.
 
+#[cfg(not(target_family = "wasm"))]
 pub use stylet_shm_schema::affinity::now_ns;
+
+/// Stands still: a browser steps the loops at times that it chooses, and has no such clock.
+#[cfg(target_family = "wasm")]
+pub fn now_ns() -> u64 {
+    0
+}
 
 /// Period of the force loop: 1 kHz.
 pub const HAPTIC_PERIOD_NS: u64 = 1_000_000;
@@ -21,6 +28,7 @@ pub fn phase_ns(phase: f64, period_ns: u64) -> u64 {
 }
 
 /// Returns at `time_ns` or later; continues to sleep after a signal.
+#[cfg(not(target_family = "wasm"))]
 pub fn sleep_until(time_ns: u64) {
     let time = libc::timespec {
         tv_sec: (time_ns / 1_000_000_000) as libc::time_t,
@@ -54,6 +62,7 @@ impl Wait {
     }
 
     /// Waits until `time_ns`; returns the number of justified sleeps.
+    #[cfg(not(target_family = "wasm"))]
     pub fn until(self, time_ns: u64) -> u64 {
         let awake_ns = time_ns.saturating_sub(self.spin_ns);
         let mut sleeps = 0;

@@ -12,6 +12,7 @@
     deny(clippy::disallowed_macros, clippy::disallowed_methods, clippy::disallowed_types)
 )]
 
+#[cfg(not(target_family = "wasm"))]
 pub mod arm;
 pub mod capacities;
 pub mod clock;
@@ -35,6 +36,7 @@ pub mod recorder;
 pub mod response;
 pub mod second;
 pub mod seed;
+pub mod shown;
 pub mod taped;
 pub mod timing;
 pub mod tissue;

@@ -134,6 +134,10 @@ impl Pin {
 /// A writable pin, and the time of its next edge.
 #[derive(Clone, Debug)]
 pub struct Toggle {
+    #[cfg_attr(
+        not(target_arch = "x86_64"),
+        expect(dead_code, reason = "there are no ports to write")
+    )]
     pin: Pin,
     level: usize,
     left: u32,

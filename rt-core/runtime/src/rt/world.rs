@@ -1,12 +1,11 @@
 //! The tissue loop's scene: built by another thread, swapped in as a whole.
 
-use stylet_shm_schema::{SnapshotHeader, Vertex};
+use crate::rt::shown::Shown;
 use stylet_sim::limits::Limits;
 use stylet_sim::migration::Migration;
 use stylet_sim::needle::LayerKind;
 use stylet_sim::scene::Scene;
 use stylet_sim::tissue::{MaterialPoint, TissueError, TissueModel, TissueSpec};
-use stylet_wall::board::Writer;
 
 /// Body, tissue and surface of one scene.
 pub struct World {
@@ -30,7 +29,7 @@ pub struct World {
     /// faster.
     pub looks_near_tip: bool,
     /// Destination of snapshots, in a run that shows any.
-    pub shown: Option<Writer<SnapshotHeader, Vertex>>,
+    pub shown: Option<Shown>,
 }
 
 impl World {

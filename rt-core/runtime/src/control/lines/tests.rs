@@ -37,23 +37,21 @@ const INTO_BODY: [f64; 3] = [0.0, 0.0, 1.0];
 /// A second needle had to wait for its line as the first had, though the plan named both.
 #[test]
 fn the_lines_of_both_planned_needles_are_there_when_they_come() {
-    let mut lines = LinePreparer::new(Arc::new(cube(6)), TissueKind::Fem);
+    let mut lines = LinePreparer::new(Arc::new(cube(6)), TissueKind::Fem, Work::AtOnce);
     let (mut rings, mut haptic, _tissue) = rings();
     let entries_m = [[5e-3, 5e-3, 0.0], [7e-3, 5e-3, 0.0]];
     lines.expect_planned(Some((entries_m[0], INTO_BODY)));
     lines.expect_next(entries_m[1], INTO_BODY);
-    let begun = Instant::now();
-    while lines.kept.len() < 2 && begun.elapsed() < Duration::from_secs(60) {
-        lines.pass(Some(&needle_at([0.5, 0.5, -0.1], flags::IN_CONTACT)), 1, &mut rings);
-        std::thread::sleep(Duration::from_millis(2));
+    for _ in 0..3 {
+        lines.pass(0, Some(&needle_at([0.5, 0.5, -0.1], flags::IN_CONTACT)), 1, &mut rings);
     }
     assert_eq!(lines.kept.len(), 2, "both are prepared while a needle is in tissue");
     assert!(haptic.lines.pop().is_err(), "and no loop has them yet");
-    for (entry_m, left) in entries_m.into_iter().zip([1, 0]) {
+    for ((entry_m, left), now_ns) in entries_m.into_iter().zip([1, 0]).zip([0, 2 * STEADY_NS]) {
         let outside = needle_at([entry_m[0], entry_m[1], -0.02], 0);
-        lines.pass(Some(&outside), 1, &mut rings);
-        std::thread::sleep(STEADY);
-        lines.pass(Some(&outside), 1, &mut rings);
+        lines.pass(now_ns, Some(&outside), 1, &mut rings);
+        assert!(haptic.lines.pop().is_err(), "it may still move on");
+        lines.pass(now_ns + STEADY_NS, Some(&outside), 1, &mut rings);
         let line = haptic
             .lines
             .pop()
@@ -67,16 +65,16 @@ fn the_lines_of_both_planned_needles_are_there_when_they_come() {
 /// A plan whose needle misses the body must not cause endless retries, nor drop the line in use.
 #[test]
 fn an_axis_without_tissue_is_tried_once() {
-    let mut lines = LinePreparer::new(Arc::new(cube(4)), TissueKind::Fem);
+    let mut lines = LinePreparer::new(Arc::new(cube(4)), TissueKind::Fem, Work::AtOnce);
     let (mut rings, ..) = rings();
     lines.expect_planned(Some(([0.1, 0.1, 0.0], INTO_BODY)));
-    let begun = Instant::now();
-    while lines.without.is_empty() && begun.elapsed() < Duration::from_secs(60) {
-        lines.pass(Some(&needle_at([0.5, 0.5, -0.1], flags::IN_CONTACT)), 1, &mut rings);
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    for _ in 0..20 {
-        lines.pass(Some(&needle_at([0.5, 0.5, -0.1], flags::IN_CONTACT)), 1, &mut rings);
+    for now_ns in 0..20 {
+        lines.pass(
+            now_ns,
+            Some(&needle_at([0.5, 0.5, -0.1], flags::IN_CONTACT)),
+            1,
+            &mut rings,
+        );
     }
     assert_eq!((lines.without.len(), lines.generation), (1, 1));
 }
