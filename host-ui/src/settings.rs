@@ -38,6 +38,14 @@ pub enum Layout {
 impl Layout {
     pub const ALL: [Self; 5] = [Self::Quad, Self::Solid, Self::Slices, Self::Probe, Self::Fluoroscopy];
 
+    /// Returns the layouts to choose from. A page cannot wait for the graphics card, which computes the last two.
+    pub fn offered() -> &'static [Self] {
+        match crate::IN_PAGE {
+            true => &Self::ALL[..3],
+            false => &Self::ALL,
+        }
+    }
+
     pub fn name(self) -> &'static str {
         match self {
             Self::Quad => "All views",
@@ -49,7 +57,8 @@ impl Layout {
     }
 
     pub fn next(self) -> Self {
-        Self::ALL[(self as usize + 1) % Self::ALL.len()]
+        let offered = Self::offered();
+        offered[(self as usize + 1) % offered.len()]
     }
 }
 
@@ -135,10 +144,11 @@ impl Settings {
 
 /// Returns how much the present window enlarges text.
 pub fn fit_of(ctx: &egui::Context) -> f32 {
-    // Without a screen, as in tests, the size does not follow the scale.
-    match ctx.input(|i| i.viewport().monitor_size) {
-        Some(_) => text_scale(ctx.content_rect().size() * ctx.zoom_factor()),
-        None => 1.0,
+    // Without a screen, as in tests, the size does not follow the scale. A page does not know its screen.
+    let is_on_screen = crate::IN_PAGE || ctx.input(|i| i.viewport().monitor_size.is_some());
+    match is_on_screen {
+        true => text_scale(ctx.content_rect().size() * ctx.zoom_factor()),
+        false => 1.0,
     }
 }
 

@@ -158,6 +158,7 @@ impl App {
 
     /// Returns the action for a dropped file. A folder is an image series; while the plan's step is
     /// open, a file that is not a volume is a plan.
+    #[cfg(not(target_family = "wasm"))]
     pub(super) fn dropped_file(&self, ctx: &egui::Context) -> Option<Action> {
         let path = ctx.input(|i| {
             i.raw

@@ -3,8 +3,8 @@
 //! Renewal is tied to the host's own calls of `poll`, not to the receiving thread, which would outlive a hung host.
 
 use super::Answer;
-use std::time::{Duration, Instant};
 use stylet_shm_schema::{Event, EventKind, Request, VALID_RANGE_S};
+use web_time::{Duration, Instant};
 
 /// Number of polls over which the host's pauses are measured.
 const POLLS: usize = 16;
