@@ -77,11 +77,13 @@ type Picked = Result<Option<PathBuf>, DialogError>;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DialogError {
     /// Neither a session bus nor zenity is present.
+    #[cfg(not(target_family = "wasm"))]
     #[error(
         "this desktop has no file dialog (no session bus with a portal, no zenity): type the path into the field instead"
     )]
     NoDesktop,
     /// The portal did not answer, or refused.
+    #[cfg(not(target_family = "wasm"))]
     #[error(
         "the desktop's file dialog did not open (is xdg-desktop-portal installed?): type the path into the field instead"
     )]

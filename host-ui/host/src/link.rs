@@ -13,6 +13,8 @@ mod received;
 #[cfg(not(target_family = "wasm"))]
 mod receiver;
 #[cfg(not(target_family = "wasm"))]
+mod renewals;
+#[cfg(not(target_family = "wasm"))]
 mod second;
 mod thread;
 mod upload;

@@ -5,6 +5,7 @@ use crate::action::{Action, PlanAction, StructuresAction, WatchAction};
 use crate::dialog::Purpose;
 use crate::loader::Loaded;
 use crate::panel::structures::StructureTable;
+#[cfg(not(target_family = "wasm"))]
 use crate::panel::workflow::Progress;
 use crate::recent;
 use crate::shown::LoadState;

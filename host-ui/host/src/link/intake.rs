@@ -34,6 +34,8 @@ pub enum Published<'a> {
 pub struct Intake {
     host_id: u64,
     session: Option<Session>,
+    /// The newest state, which tells deaf ports.
+    #[cfg_attr(target_family = "wasm", expect(dead_code))]
     tick: u64,
     /// The newest record: a restarted bridge sends older ones again.
     record_tick: u64,
@@ -50,11 +52,13 @@ impl Intake {
     }
 
     /// The present run.
+    #[cfg(not(target_family = "wasm"))]
     pub fn session(&self) -> Option<&Session> {
         self.session.as_ref()
     }
 
     /// Newest tick of the state, and of the records.
+    #[cfg(not(target_family = "wasm"))]
     pub fn ticks(&self) -> [u64; 2] {
         [self.tick, self.record_tick]
     }

@@ -9,5 +9,7 @@ pub enum Outgoing {
     /// This host's motions continue until then, as long as this process runs.
     Promise(Instant),
     Upload(Box<UploadHeader>, Vec<u8>),
+    /// For a relay, which no page has.
+    #[cfg_attr(target_family = "wasm", expect(dead_code))]
     Lease(LeaseOrder),
 }

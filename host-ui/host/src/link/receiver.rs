@@ -5,9 +5,9 @@
 
 use super::inbox::Inbox;
 use super::intake::{Intake, Published, is_usable};
-use super::motion::Renewals;
 use super::outgoing::Outgoing;
 use super::ports::Ports;
+use super::renewals::Renewals;
 use super::second::SecondEnds;
 use super::thread::lock;
 use super::{ABSENT_AFTER, Snapshot, UNANSWERED};
