@@ -11,7 +11,7 @@ COMPRESSED = --features stylet-files/compressed
 PACKAGED = $(COMPRESSED) --features host-ui/screen-reader
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: wasm-test animation attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release reproducible sbom libraries package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures python python-beside python-test clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: wasm-test animation attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release reproducible sbom libraries package package-test picture example report seeds-oracle population validation causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures python python-beside python-test web web-test clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -170,6 +170,18 @@ python-beside: python ## Compute twenty implants also by dicompyler-core, pymedp
 	$(PYTHON)/beside/bin/pip install -q -r rt-core/python/tests/requirements.txt terminaltables xlrd
 	$(PYTHON)/beside/bin/pip install -q --no-deps $(WHEELS)/stylet-*.whl
 	UPDATE_DOCS=1 $(PYTHON)/beside/bin/python rt-core/python/tests/beside.py
+
+# A folder that any static server can serve.
+SITE = $(abspath $(or $(CARGO_TARGET_DIR),target))/web-site
+
+web: ## Build the window for a browser, which plays recordings, into target/web-site (some minutes)
+	@docs/tools/need cargo binaryen brotli clang llvm
+	docs/tools/web $(SITE)
+
+web-test: web ## Open the page in headless Chromium in three sizes, and drop a recording onto it
+	@docs/tools/need chromium python3-venv
+	python3 -m venv $(SITE)-test && $(SITE)-test/bin/pip install -q playwright==1.63.0
+	$(SITE)-test/bin/python host-ui/web/check.py $(SITE) host-ui/example/insertion.mcap $(SITE)-test/pictures
 
 attributes: ## Read 10,000 objects of each kind with damaged attributes; a wrong figure without a note fails
 	STYLET_ATTRIBUTES=$(or $(OBJECTS),10000) $(CARGO) test --profile quick -p stylet-files --lib damaged_attributes -- --nocapture

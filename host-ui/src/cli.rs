@@ -4,9 +4,11 @@ use crate::app;
 use crate::command::CommandError;
 use crate::command::picture::PictureArgs;
 use clap::{CommandFactory, Parser, Subcommand};
+use std::rc::Rc;
 use stylet_controllers as controller;
 use stylet_files::dicom::Shared;
 use stylet_files::together;
+use stylet_host::link::Link;
 use stylet_host::{health, record};
 use stylet_implant::procedure;
 use stylet_manual::{ManualArgs, Product};
@@ -100,7 +102,7 @@ impl Cli {
                 let mut instances = window.trainees.iter().map(|trainee| trainee.instance.clone());
                 window.core.instance = instances.next().unwrap_or(window.core.instance);
                 let instances: Vec<Instance> = instances.chain([window.core.instance.clone()]).collect();
-                let ended = app::run(window);
+                let ended = app::run(window, Rc::new(Link::new));
                 instances.iter().for_each(Instance::sweep);
                 Ok(ended?)
             }

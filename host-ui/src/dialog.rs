@@ -2,10 +2,12 @@
 //! for one.
 
 use std::path::{Path, PathBuf};
+#[cfg(not(target_family = "wasm"))]
 use std::time::{Duration, Instant};
 use stylet_base::job::{Job, JobUpdate};
 
 /// Shortest time in which a person can close a dialog; a faster end means that it never opened.
+#[cfg(not(target_family = "wasm"))]
 const OPENS_WITHIN: Duration = Duration::from_millis(400);
 
 /// Purpose of a dialog.
@@ -45,6 +47,7 @@ impl Purpose {
     }
 
     /// Returns the names of the formats, each with its file extensions.
+    #[cfg(not(target_family = "wasm"))]
     fn formats(self) -> &'static [(&'static str, &'static [&'static str])] {
         match self {
             Self::Scene => &[
@@ -74,15 +77,21 @@ type Picked = Result<Option<PathBuf>, DialogError>;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DialogError {
     /// Neither a session bus nor zenity is present.
+    #[cfg(not(target_family = "wasm"))]
     #[error(
         "this desktop has no file dialog (no session bus with a portal, no zenity): type the path into the field instead"
     )]
     NoDesktop,
     /// The portal did not answer, or refused.
+    #[cfg(not(target_family = "wasm"))]
     #[error(
         "the desktop's file dialog did not open (is xdg-desktop-portal installed?): type the path into the field instead"
     )]
     NotOpened,
+    /// The window is a web page.
+    #[cfg(target_family = "wasm")]
+    #[error("a web page opens no files by their paths: drop a recording onto it")]
+    Page,
     /// Its thread ended without a result.
     #[error("the file dialog ended without an answer: type the path into the field instead")]
     Ended,
@@ -121,6 +130,12 @@ impl Dialogs {
     }
 }
 
+#[cfg(target_family = "wasm")]
+fn pick(_purpose: Purpose, _folder: Option<PathBuf>) -> Picked {
+    Err(DialogError::Page)
+}
+
+#[cfg(not(target_family = "wasm"))]
 fn pick(purpose: Purpose, folder: Option<PathBuf>) -> Picked {
     if !is_possible(|name| std::env::var_os(name).map(PathBuf::from)) {
         return Err(DialogError::NoDesktop);
@@ -146,6 +161,7 @@ fn pick(purpose: Purpose, folder: Option<PathBuf>) -> Picked {
 }
 
 /// Returns whether a dialog is possible: a session bus that may have a portal, or zenity.
+#[cfg(not(target_family = "wasm"))]
 fn is_possible(variable: impl Fn(&str) -> Option<PathBuf>) -> bool {
     let has_bus = variable("DBUS_SESSION_BUS_ADDRESS").is_some_and(|address| !address.as_os_str().is_empty())
         || variable("XDG_RUNTIME_DIR").is_some_and(|folder| folder.join("bus").exists());
@@ -157,6 +173,7 @@ fn is_possible(variable: impl Fn(&str) -> Option<PathBuf>) -> bool {
 }
 
 /// Adds the extension that selects a plan's format.
+#[cfg(not(target_family = "wasm"))]
 fn with_ending(purpose: Purpose, path: PathBuf) -> PathBuf {
     let [(_, [ending])] = purpose.formats() else {
         return path;

@@ -40,6 +40,14 @@ pub enum Layout {
 impl Layout {
     pub const ALL: [Self; 5] = [Self::Quad, Self::Solid, Self::Slices, Self::Probe, Self::Fluoroscopy];
 
+    /// Returns the layouts to choose from. A page cannot wait for the graphics card, which computes the last two.
+    pub fn offered() -> &'static [Self] {
+        match crate::IN_PAGE {
+            true => &Self::ALL[..3],
+            false => &Self::ALL,
+        }
+    }
+
     pub fn name(self) -> &'static str {
         match self {
             Self::Quad => "All views",
@@ -51,7 +59,8 @@ impl Layout {
     }
 
     pub fn next(self) -> Self {
-        Self::ALL[(self as usize + 1) % Self::ALL.len()]
+        let offered = Self::offered();
+        offered[(self as usize + 1) % offered.len()]
     }
 }
 
@@ -137,13 +146,12 @@ impl Settings {
 
 /// Returns how much the present window enlarges text, and the largest scale that it has room for.
 pub fn fit_of(ctx: &egui::Context) -> [f32; 2] {
-    // Without a screen, as in tests, the size does not follow the scale.
-    match ctx.input(|i| i.viewport().monitor_size) {
-        Some(_) => {
-            let size = ctx.content_rect().size() * ctx.zoom_factor();
-            [text_scale(size), largest_scale(size)]
-        }
-        None => [1.0, SCALES[1]],
+    // Without a screen, as in tests, the size does not follow the scale. A page does not know its screen.
+    if crate::IN_PAGE || ctx.input(|i| i.viewport().monitor_size.is_some()) {
+        let size = ctx.content_rect().size() * ctx.zoom_factor();
+        [text_scale(size), largest_scale(size)]
+    } else {
+        [1.0, SCALES[1]]
     }
 }
 

@@ -1,28 +1,29 @@
 //! Gamepads and 3D mice that hold the needle: found, read and interpreted on a separate thread.
 //!
-//! Events go one way: `found` (list of devices) → `state` (events to a [`Wish`]) → `hub` (choice of
+//! Below `system`, events go one way: `found` (list of devices) → `state` (events to a [`Wish`]) → `hub` (choice of
 //! the device that holds the needle) → `reader` (the thread) → the window, which asks the core to
 //! move the hand as it does for the mouse.
 
 #![warn(missing_docs)]
 
-mod axis;
-mod error;
-mod found;
-mod hub;
+#[cfg(target_family = "wasm")]
+mod absent;
 mod kind;
-mod list;
-mod reader;
-mod state;
+mod latest;
+#[cfg(not(target_family = "wasm"))]
+mod system;
+mod wish;
 
-pub use axis::{Axis, SLOWEST_M_PER_S};
-pub use error::{ListError, OpenError};
-pub use found::{Found, Places, find};
-pub use hub::{Device, DeviceHub, DeviceSource, Latest, OpenDevice};
+#[cfg(target_family = "wasm")]
+pub use absent::Controllers;
 pub use kind::{Button, Kind};
-pub use list::list;
-pub use reader::{Controllers, System};
-pub use state::{DeviceState, ProbeWish, Wish};
+pub use latest::{Device, Latest};
+#[cfg(not(target_family = "wasm"))]
+pub use system::{
+    Axis, Controllers, DeviceHub, DeviceSource, DeviceState, Found, ListError, OpenDevice, OpenError, Places, System,
+    find, list,
+};
+pub use wish::{ProbeWish, SLOWEST_M_PER_S, Wish};
 
 /// Speed of the tip along the needle at full deflection; equal to that of the keys.
 pub const ALONG_M_PER_S: f64 = 0.04;

@@ -3,8 +3,10 @@
 #![warn(missing_docs)]
 
 pub mod core_args;
+#[cfg(not(target_family = "wasm"))]
 pub mod health;
 pub mod link;
 pub mod moments;
+#[cfg(not(target_family = "wasm"))]
 pub mod record;
 pub mod roster;

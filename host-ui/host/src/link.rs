@@ -1,27 +1,40 @@
 //! The host's only access to shared memory: receives and validates what the core publishes, and sends requests.
 
+mod here;
 mod inbox;
+mod intake;
 mod motion;
+mod outgoing;
 mod player;
+// A web page has no shared memory.
+#[cfg(not(target_family = "wasm"))]
 mod ports;
 mod received;
+#[cfg(not(target_family = "wasm"))]
 mod receiver;
+#[cfg(not(target_family = "wasm"))]
+mod renewals;
+#[cfg(not(target_family = "wasm"))]
 mod second;
 mod thread;
+mod upload;
+mod worker;
 
 use inbox::{Inbox, Pulse, RECORDS_KEPT, Run};
 use motion::Motions;
-use receiver::Outgoing;
+use outgoing::Outgoing;
 use std::collections::{BTreeMap, VecDeque};
+use std::fmt::Display;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-use stylet_anatomy::Role;
-use stylet_files::{LabelVolume, Tissue};
 use stylet_shm_schema::*;
 use thread::Receiver;
+use web_time::{Duration, Instant};
 
-pub use player::{Piece, Playback, Played, TimeMark};
+pub use here::LocalCore;
+pub use intake::Published;
+pub use player::{Piece, Playback, Played, RecordingError, ShowError, TimeMark, played, played_of};
 pub use received::{Answer, LinkError, LinkStatus, SceneModel, Snapshot};
+pub use upload::MAX_UPLOAD_CELLS;
 
 /// Begins the command in the reason of [`LinkStatus::Absent`], which a program that can start a core leaves out.
 pub const START_IT: &str = "Start it in another terminal";
@@ -39,8 +52,6 @@ const ANSWERS_KEPT: usize = 256;
 const REHEARSALS_KEPT: usize = 8;
 /// Number of a command that needs no answer.
 const UNANSWERED: u64 = 0;
-/// Largest volume that the core accepts, in cells.
-pub const MAX_UPLOAD_CELLS: usize = 64 << 20;
 
 /// One host's connection to the core of one instance.
 ///
@@ -67,7 +78,13 @@ pub struct Link {
 fn random_host_id() -> u64 {
     use std::hash::{BuildHasher, Hasher};
     let mut hasher = std::collections::hash_map::RandomState::new().build_hasher();
-    hasher.write_u32(std::process::id());
+    // A page has no number.
+    let process = if cfg!(target_family = "wasm") {
+        0
+    } else {
+        std::process::id()
+    };
+    hasher.write_u32(process);
     hasher.finish()
 }
 
@@ -75,6 +92,16 @@ impl Link {
     /// Never fails and never blocks: a thread connects, and reconnects as needed.
     pub fn new(instance: Instance) -> Self {
         Self::with_snapshots_every(instance, SNAPSHOTS_EVERY)
+    }
+
+    /// Connects to a core in this process, which `make` makes where it runs: on a thread, or in a page in each
+    /// [`Link::poll`].
+    pub fn here<C: LocalCore, E: Display>(
+        instance: Instance,
+        make: impl FnOnce() -> Result<C, E> + Send + 'static,
+    ) -> Self {
+        let host_id = random_host_id();
+        Self::of(instance, host_id, Receiver::here(host_id, make), None)
     }
 
     /// Plays a recording as if from a core; every request is refused.
@@ -318,36 +345,6 @@ impl Link {
         Ok(id)
     }
 
-    /// Uploads a segmented volume for the core to run instead of the present scene.
-    pub fn upload(&mut self, volume: &LabelVolume) -> Result<u64, LinkError> {
-        let expected: usize = volume.dims.iter().product();
-        if volume.cells.len() != expected || !(1..=MAX_UPLOAD_CELLS).contains(&expected) {
-            return Err(LinkError::Volume {
-                cells: volume.cells.len(),
-                expected,
-                most: MAX_UPLOAD_CELLS,
-            });
-        }
-        let id = self.next_id()?;
-        let mut header = UploadHeader {
-            host_id: self.host_id,
-            command_id: id,
-            dims: volume.dims.map(|d| d as u32),
-            spacing_m: volume.spacing_m,
-            patient_from_scene: volume.patient.to_wire(),
-            name: Text::new(&volume.name),
-            structure_count: volume.structures.len().min(MAX_STRUCTURES) as u32,
-            ..UploadHeader::default()
-        };
-        for (sent, tissue) in header.structures.iter_mut().zip(&volume.structures) {
-            *sent = upload_structure(tissue);
-        }
-        for (sent, layer) in header.layers.iter_mut().zip(&volume.layers) {
-            *sent = [layer.thickness_m, layer.young_pa];
-        }
-        self.ask(id, Outgoing::Upload(Box::new(header), volume.cells.clone()))
-    }
-
     /// Queues a message; one that cannot be sent later is refused by an [`Answer`].
     fn ask(&self, id: u64, outgoing: Outgoing) -> Result<u64, LinkError> {
         match self.receiver.send(outgoing) {
@@ -379,22 +376,4 @@ fn join<T>(held: &mut VecDeque<T>, new: VecDeque<T>) {
     held.extend(new);
     let beyond = held.len().saturating_sub(RECORDS_KEPT);
     held.drain(..beyond);
-}
-
-fn upload_structure(tissue: &Tissue) -> UploadStructure {
-    let role = match tissue.role {
-        Role::Target => role::TARGET,
-        Role::Spare => role::SPARE,
-        Role::Tissue => 0,
-    };
-    UploadStructure {
-        label: u32::from(tissue.label),
-        role: role | if tissue.material.fixed { role::FIXED } else { 0 },
-        own_limits: u32::from(tissue.material.limits.is_some()),
-        surroundings: tissue.material.surroundings.to_wire(),
-        young_pa: tissue.material.young_pa,
-        poisson: tissue.material.poisson,
-        limits: tissue.material.limits.unwrap_or_default(),
-        name: Text::new(&tissue.name),
-    }
 }

@@ -4,8 +4,8 @@ use crate::link::{Link, LinkError};
 use crate::moments::STOPPED;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
-use std::time::Instant;
 use stylet_shm_schema::{HapticState, Instance, InstanceError, Mark, PlanInForce, Relayed, Request, Session};
+use web_time::Instant;
 
 /// A trainee and their core.
 #[derive(Clone, Debug, PartialEq)]

@@ -23,6 +23,7 @@ pub struct NoGpu {
     why: Box<dyn Error + Send + Sync>,
 }
 
+#[cfg(not(target_family = "wasm"))]
 impl NoGpu {
     fn of(why: impl Error + Send + Sync + 'static) -> Self {
         Self { why: Box::new(why) }
@@ -36,6 +37,7 @@ impl Gpu {
     /// # Errors
     ///
     /// No Vulkan driver, or one that does not compute.
+    #[cfg(not(target_family = "wasm"))]
     pub fn headless(software: bool) -> Result<Self, NoGpu> {
         let mut asked = wgpu::InstanceDescriptor::new_without_display_handle();
         asked.backends = wgpu::Backends::VULKAN;
@@ -53,9 +55,10 @@ impl Gpu {
         Ok(Self { device, queue })
     }
 
-    /// Returns whether it can compute; drivers of OpenGL may not.
+    /// Returns whether it can compute; drivers of OpenGL may not. A web page gets results only between its frames, and
+    /// the passes wait for them.
     pub fn computes(&self) -> bool {
-        self.device.limits().max_compute_workgroups_per_dimension > 0
+        !cfg!(target_family = "wasm") && self.device.limits().max_compute_workgroups_per_dimension > 0
     }
 
     pub(crate) fn storage(&self, bytes: u64) -> wgpu::Buffer {

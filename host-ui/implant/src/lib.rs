@@ -7,6 +7,7 @@ pub mod linked;
 pub mod pairing;
 mod patient;
 pub mod plan;
+#[cfg(not(target_family = "wasm"))]
 pub mod procedure;
 pub mod provenance;
 pub mod readers;

@@ -10,12 +10,12 @@ use crate::panel::workflow::{Undo, next_action, undo_action};
 use crate::planner::Edit;
 use crate::settings::ThemeChoice;
 use crate::shown::LoadState;
-use std::time::Instant;
 use stylet_controllers::Wish;
 use stylet_implant::workflow::{default_plan, move_request};
 use stylet_shm_schema::{
     BUILTIN_SCENES, PARAMETERS, ParameterChange, ParameterProblems, ParameterSet, PlannedNeedle, ProblemList, Request,
 };
+use web_time::Instant;
 
 /// Farthest goal ahead of the tip for a hand that pulls it.
 const PULLED_M: f64 = 0.02;
@@ -140,9 +140,13 @@ impl App {
                     ThemeChoice::Light => ThemeChoice::Dark,
                 };
             }
-            Action::SavePicture => self.pictures.request(ctx),
             Action::SaveDebrief => self.save_debrief(),
+            #[cfg(not(target_family = "wasm"))]
+            Action::SavePicture => self.pictures.request(ctx),
+            #[cfg(not(target_family = "wasm"))]
             Action::StartCore => self.start_core(),
+            #[cfg(target_family = "wasm")]
+            Action::SavePicture | Action::StartCore => self.refuse("A web page saves no pictures and starts no core."),
             Action::ReduceNotRealTime => self.shown.reduced = self.shown.session.map(|s| s.session_id),
             Action::DismissDisconnected => self.shown.disconnected = None,
             Action::DismissRefusals => {

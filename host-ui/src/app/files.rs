@@ -5,6 +5,7 @@ use crate::action::{Action, PlanAction, StructuresAction, WatchAction};
 use crate::dialog::Purpose;
 use crate::loader::Loaded;
 use crate::panel::structures::StructureTable;
+#[cfg(not(target_family = "wasm"))]
 use crate::panel::workflow::Progress;
 use crate::recent;
 use crate::shown::LoadState;
@@ -158,6 +159,7 @@ impl App {
 
     /// Returns the action for a dropped file. A folder is an image series; while the plan's step is
     /// open, a file that is not a volume is a plan.
+    #[cfg(not(target_family = "wasm"))]
     pub(super) fn dropped_file(&self, ctx: &egui::Context) -> Option<Action> {
         let path = ctx.input(|i| {
             i.raw

@@ -1,7 +1,7 @@
 //! Frame rate of the window, and mean cost of a frame.
 
 use crate::shown::FrameCost;
-use std::time::{Duration, Instant};
+use web_time::{Duration, Instant};
 
 const INTERVAL: Duration = Duration::from_secs(1);
 

@@ -1,13 +1,22 @@
 //! The window: takes new data, draws the panels, executes their requests. A frame never waits.
 
 mod act;
+#[cfg(not(target_family = "wasm"))]
 mod core;
 mod debrief;
+#[cfg(not(target_family = "wasm"))]
+mod desktop;
 mod drive;
+#[cfg(target_family = "wasm")]
+mod dropped;
+#[cfg(not(target_family = "wasm"))]
 mod error;
 mod files;
 mod frames;
 mod layout;
+#[cfg(not(target_family = "wasm"))]
+mod open;
+mod options;
 mod patch;
 mod plan;
 mod second;
@@ -24,6 +33,7 @@ use crate::panel::instructor::InstructorState;
 use crate::panel::parameters::ParametersState;
 use crate::panel::question::Question;
 use crate::panel::workflow::WorkflowState;
+#[cfg(not(target_family = "wasm"))]
 use crate::picture::Pictures;
 use crate::planner::Planner;
 use crate::redraw::Redraw;
@@ -31,64 +41,28 @@ use crate::settings::{self, Settings};
 use crate::shown::{FrameCost, Note, Shown};
 use crate::view::middle::Middle;
 use crate::{cpu_time, keyboard, theme};
-use clap::Args;
-use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::rc::Rc;
 use stylet_base::format;
 use stylet_base::job::Job;
 use stylet_base::lines::Lines;
-use stylet_controllers::{Controllers, ProbeWish, SLOW, System, Wish};
+use stylet_controllers::{Controllers, ProbeWish, SLOW, Wish};
 use stylet_host::core_args::CoreArgs;
 use stylet_host::link::{Link, LinkStatus};
-use stylet_host::roster::{self, Trainee};
 use stylet_implant::received::ReceivedProcedure;
 use stylet_implant::workflow::{Pace, Run};
+use stylet_shm_schema::Instance;
+#[cfg(not(target_family = "wasm"))]
 use stylet_shm_schema::affinity::Left;
+use web_time::{Duration, Instant};
 
 const LIVE_FRAME: Duration = Duration::from_millis(16);
 const ABSENT_FRAME: Duration = Duration::from_millis(250);
 
+#[cfg(not(target_family = "wasm"))]
 pub use error::WindowError;
-
-/// Options of the window.
-#[derive(Args, Clone, Debug, Default)]
-pub struct Options {
-    /// Core and scene.
-    #[command(flatten)]
-    pub core: CoreArgs,
-    /// Image for the slices instead of simulated ultrasound, of the patient of --scene FILE: a
-    /// DICOM series (its folder, or one of its files), NIfTI-1, NRRD, MetaImage
-    #[arg(long, value_name = "FILE", requires = "scene")]
-    pub image: Option<PathBuf>,
-    /// Show a recording made by 'host-ui record' instead of a running rt-core; nothing in it can be
-    /// moved
-    #[arg(long, value_name = "FILE.mcap", conflicts_with = "scene")]
-    pub watch: Option<PathBuf>,
-    /// Ignore gamepads and 3D mice: only keys and mouse move the needle
-    #[arg(long)]
-    pub no_controllers: bool,
-    /// Draw frames without a pause, for measurements
-    #[arg(long)]
-    pub without_pause: bool,
-    /// Print each second how many frames were drawn and their cost
-    #[arg(long)]
-    pub count_frames: bool,
-    /// Show a square in the lower right corner that switches between dark and light when the tip
-    /// has moved by 0.5 mm, for a photodiode
-    #[arg(long)]
-    pub patch: bool,
-    /// Show a trainee in a list, with the instance of their rt-core or of a 'relay join'; may be
-    /// given several times; the window follows the first
-    #[arg(long = "trainee", value_name = "NAME=INSTANCE")]
-    pub trainees: Vec<Trainee>,
-    /// Write a debrief into DIR/NAME/DATE at the end of each procedure, for 'host-ui class'
-    #[arg(long, value_name = "DIR")]
-    pub class: Option<PathBuf>,
-    /// Name of the operator at this window, for --class [default: the instance; with a list, the
-    /// followed trainee]
-    #[arg(long, value_name = "NAME", requires = "class", value_parser = roster::name)]
-    pub name: Option<String>,
-}
+#[cfg(not(target_family = "wasm"))]
+pub use open::run;
+pub use options::Options;
 
 /// Command without an answer so far.
 struct Waiting {
@@ -97,13 +71,20 @@ struct Waiting {
     since: Instant,
 }
 
+/// Makes the link to the core of a window.
+pub type Home = Rc<dyn Fn(Instance) -> Link>;
+
 /// Window of the program.
 pub struct App {
     link: Link,
+    /// Connects to the core of this window, also after a recording; `None` if it can have none.
+    home: Option<Home>,
+    #[cfg(not(target_family = "wasm"))]
     started_core: Option<core::StartedCore>,
     shown: Shown,
     middle: Middle,
     dose: DoseWorker,
+    #[cfg(not(target_family = "wasm"))]
     pictures: Pictures,
     settings: Settings,
     /// Settings when they were last applied, and how much the window enlarged text, and could at most.
@@ -133,6 +114,7 @@ pub struct App {
     patch: Option<patch::Patch>,
     frames: frames::Frames,
     /// Processor core that this program leaves to the force loop.
+    #[cfg(not(target_family = "wasm"))]
     left_core: Left,
     drive: drive::Drive,
     second_drive: second::SecondDrive,
@@ -151,37 +133,6 @@ pub struct App {
     trainees: trainees::Trainees,
     /// Content of the middle if there is no room for the right panel.
     narrow: layout::Narrow,
-}
-
-/// Opens the window and returns when it is closed.
-///
-/// # Errors
-///
-/// Without a display or a graphics driver, or if the recording to watch cannot be opened.
-pub fn run(options: Options) -> Result<(), WindowError> {
-    if let Some(path) = &options.watch {
-        let name = || format::printable(&path.display().to_string());
-        std::fs::File::open(path).map_err(|why| WindowError::Recording(name(), why))?;
-    }
-    let mut native = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
-            .with_title("Stylet")
-            .with_app_id("stylet")
-            .with_inner_size([1280.0, 800.0])
-            .with_min_inner_size([960.0, 600.0])
-            .with_drag_and_drop(true),
-        renderer: eframe::Renderer::Wgpu,
-        ..Default::default()
-    };
-    if options.without_pause {
-        native.wgpu_options.surface.present_mode = eframe::wgpu::PresentMode::AutoNoVsync;
-    }
-    let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options))));
-    eframe::run_native("Stylet", native, create).map_err(|why| match why {
-        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => WindowError::Display(error::shown_on()),
-        eframe::Error::Wgpu(why) => WindowError::Driver(why),
-        other => WindowError::Other(other),
-    })
 }
 
 impl App {
@@ -207,6 +158,11 @@ impl App {
 
     /// Creates the window with these options, before its first frame.
     pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
+        Self::with_home(cc, options, Some(Rc::new(Link::new)))
+    }
+
+    /// As [`App::new`], with the core that `home` connects to; without one, recordings are shown alone.
+    pub fn with_home(cc: &eframe::CreationContext<'_>, options: Options, home: Option<Home>) -> Self {
         theme::apply(&cc.egui_ctx);
         if let Some(state) = &cc.wgpu_render_state {
             cc.egui_ctx.add_plugin(Redraw::new(state.clone()));
@@ -216,17 +172,25 @@ impl App {
         let shown = Shown::empty(instance.name());
         // A kept plan belongs to this window's core. A window that follows a trainee receives the
         // trainee's plan from the core.
+        #[cfg(not(target_family = "wasm"))]
         let planner = match options.trainees.is_empty() {
             true => Planner::default().keeping_in(instance.folder()),
             false => Planner::default(),
         };
+        #[cfg(target_family = "wasm")]
+        let planner = Planner::default();
         let name = options.name.unwrap_or_else(|| instance.name().to_owned());
         Self {
-            link: Link::new(instance),
+            link: home
+                .as_ref()
+                .map_or_else(|| Link::new(instance.clone()), |home| home(instance.clone())),
+            home,
+            #[cfg(not(target_family = "wasm"))]
             started_core: None,
             shown,
             middle: Middle::new(cc.wgpu_render_state.clone()),
             dose: DoseWorker::default(),
+            #[cfg(not(target_family = "wasm"))]
             pictures: Pictures::default(),
             applied: None,
             history: History::default(),
@@ -250,14 +214,12 @@ impl App {
             recording: watch::Recording::beginning_with(options.watch),
             pace: Pace::default(),
             waiting: Vec::new(),
-            controllers: match options.no_controllers {
-                true => Controllers::none(),
-                false => Controllers::start(System::default()),
-            },
+            controllers: controllers(options.no_controllers),
             pause: !options.without_pause,
             frame_lines: options.count_frames.then(Lines::to_stderr),
             patch: options.patch.then(patch::Patch::default),
             frames: frames::Frames::new(Instant::now()),
+            #[cfg(not(target_family = "wasm"))]
             left_core: Left::default(),
             drive: drive::Drive::default(),
             second_drive: second::SecondDrive::default(),
@@ -333,6 +295,19 @@ impl App {
             (true, true) => self.shown.controllers.probe.slower(SLOW),
         }
     }
+}
+
+#[cfg(not(target_family = "wasm"))]
+fn controllers(none: bool) -> Controllers {
+    match none {
+        true => Controllers::none(),
+        false => Controllers::start(stylet_controllers::System::default()),
+    }
+}
+
+#[cfg(target_family = "wasm")]
+fn controllers(_none: bool) -> Controllers {
+    Controllers::none()
 }
 
 impl eframe::App for App {

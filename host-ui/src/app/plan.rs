@@ -9,10 +9,10 @@ use crate::panel::workflow::Progress;
 use crate::settings::Layout;
 use nalgebra::Vector3;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
 use stylet_implant::plan::{ImplantPlan, exchange};
 use stylet_implant::workflow::{NeedleTask, Placed, Run, default_plan};
 use stylet_shm_schema::{PlannedNeedle, Prescribed, Request, Text};
+use web_time::{Duration, Instant};
 
 /// Period of the search for placed seeds, which compares every planned drop with every seed.
 const FIND_PLACED_EVERY: Duration = Duration::from_millis(300);

@@ -3,10 +3,10 @@
 use super::App;
 use crate::action::ProbeAction;
 use nalgebra::Vector3;
-use std::time::{Duration, Instant};
 use stylet_controllers::{ProbeWish, SLOWEST_M_PER_S};
 use stylet_imaging::ultrasound::{Pose, Probe};
 use stylet_shm_schema::{HandMove, ProbeMove, Request};
+use web_time::{Duration, Instant};
 
 /// Largest lead over a hand that is held back.
 const LEAD_M: f64 = 0.004;

@@ -8,11 +8,11 @@ use crate::action::Action;
 use crate::dose_worker::DoseRequest;
 use crate::panel::workflow::SCRIPTED_STEPS;
 use crate::shown::{LoadState, Note, all_errors};
-use std::time::{Duration, Instant};
 use stylet_controllers::Button;
 use stylet_implant::plan::Template;
 use stylet_implant::workflow::{RunStatus, move_request};
 use stylet_shm_schema::{Prescribed, Request, flags};
+use web_time::{Duration, Instant};
 
 const SUM_UP_EVERY: Duration = Duration::from_millis(500);
 /// Distance from the template at which the needle begins in another scene.
@@ -39,8 +39,8 @@ impl App {
             }
         }
         self.begin_outside();
-        self.leave_core();
-        self.take_core();
+        #[cfg(not(target_family = "wasm"))]
+        self.take_desktop();
         self.keep_of_ended_core();
         self.take_stepper();
         if self.shown.plan.map(|p| p.generation) != plan_before {
@@ -71,7 +71,6 @@ impl App {
         self.shown.dose = self.dose.latest().cloned();
         self.shown.dose_trouble = self.dose.trouble();
         self.count_refusals();
-        self.take_pictures();
         self.take_debrief();
         self.take_trainees();
         if std::mem::take(&mut self.middle.view.has_left_tip) {
@@ -102,16 +101,6 @@ impl App {
         let pace = &self.pace;
         let request = move_request(start_m, inwards, pace.approach_m_per_s, pace.acceleration_m_per_s2);
         self.send("Needle", &request);
-    }
-
-    /// Leaves the force loop's processor core to it.
-    fn leave_core(&mut self) {
-        if self.watches() {
-            return;
-        }
-        if let Some(session) = &self.shown.session {
-            self.left_core.leave(session);
-        }
     }
 
     /// Returns the dose request: the plan while it is edited or nothing is placed, else the seeds
@@ -166,14 +155,6 @@ impl App {
             self.dismissed = (session.session_id, session.refused);
         }
         self.shown.refusals = session.refused.saturating_sub(self.dismissed.1);
-    }
-
-    fn take_pictures(&mut self) {
-        match self.pictures.poll() {
-            None => {}
-            Some(Ok(path)) => self.shown.note = Some(Note::done(format!("Picture saved as {}", path.display()))),
-            Some(Err(why)) => self.refuse(why),
-        }
     }
 
     fn take_answers(&mut self, is_another_core: bool) {

@@ -8,11 +8,11 @@ use crate::planner::Planner;
 use crate::shown::all_errors;
 use std::collections::VecDeque;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkStatus};
 use stylet_host::roster::{self, Glance, Trainee};
 use stylet_implant::received::ReceivedProcedure;
 use stylet_shm_schema::flags;
+use web_time::{Duration, Instant};
 
 /// Time for which seeds still move with the tissue after the needle is out.
 const RESTS_AFTER: Duration = Duration::from_secs(3);

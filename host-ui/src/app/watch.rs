@@ -6,10 +6,10 @@ use crate::action::WatchAction;
 use crate::planner::Planner;
 use crate::shown::{Note, Watched};
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 use stylet_base::job::{Job, JobUpdate};
-use stylet_host::link::{Link, Played};
-use stylet_host::record::{self, RecordError, ShowError};
+use stylet_host::link::{Link, Played, RecordingError, ShowError, played, played_of};
 
 /// Insertion of one needle through the gland of `paper`, recorded by `make example`.
 pub(super) const EXAMPLE: &[u8] = include_bytes!("../../example/insertion.mcap");
@@ -18,15 +18,18 @@ const EXAMPLE_NAME: &str = "Example";
 const EXAMPLE_SPEED: f64 = 0.25;
 
 /// Reading of a recording; the text of an error follows the name of the file.
-type Read = Job<Result<Played, WatchError>>;
+pub(super) type Read = Job<Result<Played, WatchError>>;
 
 /// Reason why a recording is not shown.
 #[derive(Debug, thiserror::Error)]
-enum WatchError {
+pub(super) enum WatchError {
     #[error(transparent)]
-    File(#[from] RecordError),
+    File(#[from] RecordingError),
     #[error("the example: {0}")]
     Example(#[from] ShowError),
+    #[cfg(target_family = "wasm")]
+    #[error("{0}: {1}")]
+    Dropped(String, String),
     #[error("the reader ended before the file was read")]
     Ended,
 }
@@ -57,20 +60,32 @@ impl Recording {
         let path = path.to_owned();
         let job = Job::begin("recording", move |answer, interrupt| {
             // The window may have closed; the answer is then dropped. The same holds below.
-            let _ = answer.send(record::played(&path, interrupt).map_err(WatchError::from));
+            let _ = answer.send(played(&path, interrupt).map_err(WatchError::from));
         });
         self.reading = Some((name, job));
     }
 
+    /// Shows what `reading` reads, once it is read.
+    #[cfg(target_family = "wasm")]
+    pub(super) fn begin(&mut self, name: String, reading: Read) {
+        self.reading = Some((name, reading));
+    }
+
     fn read_example(&mut self) {
         let job = Job::begin("example", |answer, interrupt| {
-            let _ = answer.send(record::played_of(EXAMPLE, interrupt).map_err(WatchError::from));
+            let _ = answer.send(played_of(EXAMPLE, interrupt).map_err(WatchError::from));
         });
         self.reading = Some((EXAMPLE_NAME.to_owned(), job));
     }
 }
 
 impl App {
+    /// Plays the example as soon as the window opens.
+    #[cfg(target_family = "wasm")]
+    pub(crate) fn begin_with_example(&mut self) {
+        self.recording.read_example();
+    }
+
     /// Returns whether a recording is shown instead of a core.
     pub(super) fn watches(&self) -> bool {
         self.link.playback().is_some()
@@ -120,6 +135,8 @@ impl App {
         if name == EXAMPLE_NAME {
             self.link.playback().into_iter().for_each(|p| p.play_at(EXAMPLE_SPEED));
         }
+        #[cfg(target_family = "wasm")]
+        super::dropped::name_page(&name);
         self.recording.name = name;
         let planner = std::mem::take(&mut self.planner);
         self.recording.planner.get_or_insert(planner);
@@ -129,7 +146,10 @@ impl App {
         if !self.watches() {
             return;
         }
-        self.change_link(Link::new);
+        let Some(home) = self.home.as_ref().map(Rc::clone) else {
+            return;
+        };
+        self.change_link(|instance| home(instance));
         if let Some(planner) = self.recording.planner.take() {
             self.planner = planner;
         }
@@ -154,6 +174,7 @@ impl App {
             speed: playback.speed(),
             marks: playback.marks(),
             has_ended: playback.has_ended(),
+            can_close: self.home.is_some(),
         });
     }
 }

@@ -3,8 +3,8 @@
 mod figures;
 
 use figures::Counted;
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use stylet_base::job::{Job, JobUpdate};
 pub use stylet_dose::criteria::Figure;
 use stylet_dose::decay::Interval;
 use stylet_dose::isodose::isodose;
@@ -156,38 +156,19 @@ impl DoseResult {
     }
 }
 
-/// Thread that computes doses: one set of seeds at a time, then the newest request.
+/// Computes doses on a thread: one set of seeds at a time, then the newest request.
+#[derive(Default)]
 pub struct DoseWorker {
-    tasks: Sender<DoseTask>,
-    results: Receiver<DoseResult>,
-    computing: bool,
+    /// The dose being computed.
+    computing: Option<Job<DoseResult>>,
+    /// What a dose leaves for the next one.
+    kept: Arc<Mutex<Kept>>,
     /// Session, generation of the scene, and the last request.
     requested: Option<(SceneId, DoseRequest)>,
     number: u64,
     latest: Option<Arc<DoseResult>>,
-    /// True once the thread has ended.
+    /// True once a thread has ended without its dose.
     lost: bool,
-}
-
-impl Default for DoseWorker {
-    /// Starts the thread. If that fails there is no dose, and [`DoseWorker::trouble`] gives the
-    /// reason.
-    fn default() -> Self {
-        let (tasks, work) = channel();
-        let (done, results) = channel();
-        let spawned = std::thread::Builder::new()
-            .name("dose".to_owned())
-            .spawn(move || compute_all(&work, &done));
-        Self {
-            tasks,
-            results,
-            computing: false,
-            requested: None,
-            number: 0,
-            latest: None,
-            lost: spawned.is_err(),
-        }
-    }
 }
 
 impl DoseWorker {
@@ -199,7 +180,7 @@ impl DoseWorker {
     /// Returns whether a dose is being computed.
     #[cfg(test)]
     fn is_computing(&self) -> bool {
-        self.computing
+        self.computing.is_some()
     }
 
     /// Returns the reason why there is no dose, if there is none.
@@ -210,14 +191,14 @@ impl DoseWorker {
     /// Takes a finished result, and requests a new one if seeds were added, removed or moved. Never
     /// waits.
     pub fn take(&mut self, scene: Option<&Arc<SceneModel>>, request: &DoseRequest) {
-        match self.results.try_recv() {
-            Ok(result) => {
-                self.computing = false;
+        match self.computing.as_ref().map(Job::poll) {
+            Some(JobUpdate::Message(result)) => {
+                self.computing = None;
                 // If all its seeds have been removed since, a dose is obsolete.
                 self.latest = (result.seeds > 0 && !request.seeds.is_empty()).then(|| Arc::new(result));
             }
-            Err(TryRecvError::Empty) => {}
-            Err(TryRecvError::Disconnected) => self.lost = true,
+            Some(JobUpdate::Ended) => (self.computing, self.lost) = (None, true),
+            Some(JobUpdate::Pending) | None => {}
         }
         // The dose of the plan does not describe the seeds in the tissue.
         self.latest = self.latest.take().filter(|result| result.of == request.of);
@@ -231,7 +212,7 @@ impl DoseWorker {
             .requested
             .as_ref()
             .is_some_and(|(scene, last)| *scene == key && last.is_same(request));
-        if known || self.computing || self.lost {
+        if known || self.computing.is_some() || self.lost {
             return;
         }
         self.number += 1;
@@ -240,7 +221,13 @@ impl DoseWorker {
             request: request.clone(),
             scene: scene.clone(),
         };
-        self.computing = self.tasks.send(task).is_ok();
+        let kept = Arc::clone(&self.kept);
+        self.computing = Some(Job::begin("dose", move |result, _| {
+            // A dose that failed left the kernel and the volumes as they were.
+            let kept = &mut *kept.lock().unwrap_or_else(PoisonError::into_inner);
+            // The window may have closed; the dose is then dropped.
+            let _ = kept.dose(&task).map(|dose| result.send(dose));
+        }));
         self.requested = Some((key, request.clone()));
     }
 }
@@ -253,29 +240,29 @@ fn is_same(a: &[Seed], b: &[Seed]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| near(a, b))
 }
 
-fn compute_all(work: &Receiver<DoseTask>, done: &Sender<DoseResult>) {
-    let mut known: Option<(String, Source, DoseKernel)> = None;
-    let mut counted: Option<(SceneId, Counted)> = None;
-    while let Ok(task) = work.recv() {
+/// Kernel of a source and volumes of a scene, which take longer than a dose.
+#[derive(Default)]
+struct Kept {
+    known: Option<(String, Source, DoseKernel)>,
+    counted: Option<(SceneId, Counted)>,
+}
+
+impl Kept {
+    /// Computes a dose; `None` without any source.
+    fn dose(&mut self, task: &DoseTask) -> Option<DoseResult> {
         let model = &task.request.source;
-        if known.as_ref().is_none_or(|(name, _, _)| name != model) {
+        if self.known.as_ref().is_none_or(|(name, _, _)| name != model) {
             // The usual source is part of the program; a test reads it.
-            let Some(source) = Source::known(model).or_else(|| Source::known(USUAL_SOURCE)) else {
-                return;
-            };
+            let source = Source::known(model).or_else(|| Source::known(USUAL_SOURCE))?;
             let kernel = DoseKernel::new(&source, Interval::ALL);
-            known = Some((model.clone(), source, kernel));
+            self.known = Some((model.clone(), source, kernel));
         }
         let scene = task.scene.header.id();
-        if counted.as_ref().is_none_or(|(of, _)| *of != scene) {
-            counted = Some((scene, Counted::of(&task.scene)));
+        if self.counted.as_ref().is_none_or(|(of, _)| *of != scene) {
+            self.counted = Some((scene, Counted::of(&task.scene)));
         }
-        let (Some((_, source, kernel)), Some((_, counted))) = (&known, &counted) else {
-            return;
-        };
-        if done.send(compute(&task, source, kernel, counted)).is_err() {
-            return;
-        }
+        let ((_, source, kernel), (_, counted)) = (self.known.as_ref()?, self.counted.as_ref()?);
+        Some(compute(task, source, kernel, counted))
     }
 }
 

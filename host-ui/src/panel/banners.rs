@@ -1,6 +1,7 @@
 //! The banners under the bar: problems of core, force and controllers, with their remedies.
 
 use super::class;
+use crate::IN_PAGE;
 use crate::action::{Action, WatchAction};
 use crate::shown::{NeedleLine, SecondHand, Shown, Watched};
 use crate::theme;
@@ -68,11 +69,19 @@ pub fn banners(shown: &Shown) -> Vec<Banner> {
 
 /// Returns the banner of a recording, which replaces the problems of the recorded core.
 fn of_recording(watched: &Watched) -> Banner {
-    let text = match watched.has_ended {
-        true => "End of recording. Close it, start rt-core, and insert a needle yourself.",
-        false => "Needle, force and tissue are shown as recorded; nothing can be moved.",
+    let text = match (watched.has_ended, IN_PAGE) {
+        (false, false) => "Needle, force and tissue are shown as recorded; nothing can be moved.",
+        (true, false) => "End of recording. Close it, start rt-core, and insert a needle yourself.",
+        (false, true) => {
+            "Shown as recorded; nothing can be moved. A browser has no real time, and no force for your hand."
+        }
+        (true, true) => "End of recording. Drop another one onto the page (.mcap, by host-ui record).",
     };
-    Banner::new(BannerLevel::Info, "A recording", text).with("Close", Action::Watch(WatchAction::Close))
+    let banner = Banner::new(BannerLevel::Info, "A recording", text);
+    match watched.can_close {
+        true => banner.with("Close", Action::Watch(WatchAction::Close)),
+        false => banner,
+    }
 }
 
 /// Returns banners for devices that were unplugged or cannot be read.
@@ -276,6 +285,10 @@ pub fn not_real_time_words(shown: &Shown) -> String {
     let advice = shown.session.map(|s| s.advice.read()).unwrap_or_default();
     let asked = shown.session.is_some_and(|s| s.no_rt_asked != 0);
     match (advice.trim(), asked) {
+        _ if IN_PAGE => {
+            "A browser has no real time: motion and force are computed late, and no device renders the force."
+                .to_owned()
+        }
         (_, true) => "Started with --no-rt. Restart without it for real-time forces.".to_owned(),
         ("", false) => "Run rt-core doctor: it lists the problems and their remedies.".to_owned(),
         (advice, _) => advice.replace('\n', "  "),

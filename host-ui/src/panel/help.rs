@@ -1,5 +1,6 @@
 //! The overlay that lists every key, and the functions of gamepads and 3D mice.
 
+use crate::IN_PAGE;
 use crate::shown::Shown;
 use crate::{keyboard, theme};
 use stylet_controllers::Kind;
@@ -24,6 +25,10 @@ pub fn help_ui(ctx: &egui::Context, shown: &Shown, open: &mut bool) {
             let room = screen.y - TITLE_AND_EDGES;
             let scroll = egui::ScrollArea::vertical().max_height(room).min_scrolled_height(room);
             scroll.show(ui, |ui| {
+                if IN_PAGE {
+                    keys_ui(ui);
+                    return;
+                }
                 if screen.x < TWO_COLUMNS {
                     ui.set_max_width(screen.x - TITLE_AND_EDGES);
                     keys_ui(ui);

@@ -4,12 +4,12 @@ use crate::action::Action;
 use crate::shown::Shown;
 use crate::theme;
 use egui::{DragValue, RichText};
-use std::time::Instant;
 use stylet_base::format;
 use stylet_host::moments::Moments;
 use stylet_shm_schema::{
     EXERCISE_STIFFNESS_RANGE, Exercise, MARK_BEFORE_RANGE_S, MARK_BYTES, MOST_MOVED_M, Mark, Request, Text,
 };
+use web_time::Instant;
 
 /// Number of moments in the list.
 const LISTED: usize = 5;

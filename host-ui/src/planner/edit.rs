@@ -2,9 +2,9 @@
 
 use super::{Failure, Planner};
 use crate::words::counted;
-use std::time::{Duration, Instant};
 use stylet_implant::plan::{History, Hole, ImplantPlan, Row, exchange};
 use stylet_shm_schema::MAX_SEEDS;
+use web_time::{Duration, Instant};
 
 /// Time within which changes of one needle count as one step to undo.
 const ONE_STEP: Duration = Duration::from_millis(800);

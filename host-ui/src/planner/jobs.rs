@@ -6,7 +6,6 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
-use std::time::{Duration, Instant};
 use stylet_base::format;
 use stylet_base::interrupt::Interrupt;
 use stylet_base::job::Job;
@@ -20,6 +19,7 @@ use stylet_implant::plan::optimise::{self, Objectives};
 use stylet_implant::plan::{Compensation, ImplantPlan, Limits, LinkRehearser, Needle, compensate, exchange};
 use stylet_implant::workflow::Pace;
 use stylet_shm_schema::Instance;
+use web_time::{Duration, Instant};
 
 /// Time within which a second host finds the core.
 const FIND_LIMIT: Duration = Duration::from_secs(10);
@@ -229,6 +229,9 @@ fn compensate_all(
     pace: &Pace,
     reporter: &Reporter<'_>,
 ) -> Result<JobMessage, Failure> {
+    if crate::IN_PAGE {
+        return Err("A web page has no thread to rehearse needles on; compensate them in the program.".into());
+    }
     let mut link = Link::new(instance);
     let begun = Instant::now();
     while link.scene().is_none() || link.state().is_none() {

@@ -26,13 +26,13 @@ pub(crate) use review::{Edit, ReviewShown};
 pub(crate) use shown::{Implant, Planning};
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
 use stylet_base::job::{Job, JobUpdate};
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::check::{Problem, problems};
 use stylet_implant::plan::{Compensation, Drops, History, ImplantPlan, Needle, Template};
 use stylet_implant::workflow::NeedleTask;
 use stylet_shm_schema::SceneId;
+use web_time::Instant;
 
 /// Any error, shown as text.
 type Failure = Box<dyn std::error::Error + Send + Sync>;

@@ -1,6 +1,7 @@
 //! Present positions of the scene's drawn surfaces and displacements of its tissue, once a frame for all pictures.
 
 use std::sync::Arc;
+use stylet_base::job::spawn;
 use stylet_host::link::{SceneModel, Snapshot};
 use stylet_shm_schema::SceneId;
 use stylet_surfaces::bodies::Bodies;
@@ -69,13 +70,10 @@ impl ShownBody {
         }
         self.making = Some(model.header.id());
         let made = Arc::clone(model);
-        let thread = std::thread::Builder::new().name("surfaces".to_owned());
-        if thread
-            .spawn(move || {
-                made.bodies();
-            })
-            .is_err()
-        {
+        let making = spawn("surfaces", move || {
+            made.bodies();
+        });
+        if making.is_err() {
             // Without a thread a frame must wait.
             model.bodies();
         }

@@ -16,12 +16,12 @@ use egui::emath::GuiRounding as _;
 use egui::{Rect, Sense, Vec2};
 use nalgebra::Vector3;
 use std::sync::{Arc, OnceLock};
-use std::time::{Duration, Instant};
 use stylet_base::job::{Job, JobUpdate};
 use stylet_imaging::fluoroscopy::{Attenuation, CArm, DoseCounter, Exposure, Fluoroscope};
 use stylet_imaging::{Body, Gpu};
 use stylet_shm_schema::{SceneHeader, SceneId};
 use stylet_surfaces::field::Field;
+use web_time::{Duration, Instant};
 
 /// Side of a picture in pixels.
 const SIDE: u32 = 512;

@@ -9,6 +9,7 @@ use super::probe::{ProbePicture, ProbeView};
 use super::scene3d::Scene3d;
 use super::slice::{ImageError, Plane, Slices};
 use super::state::{Tool, ViewState};
+use crate::IN_PAGE;
 use crate::action::{Action, Viewpoint};
 use crate::dose_worker::DoseResult;
 use crate::settings::Layout;
@@ -193,7 +194,7 @@ impl Middle {
     }
 
     fn tools_ui(&mut self, ui: &mut egui::Ui, layout: Layout, shown: &Shown, actions: &mut Vec<Action>) {
-        for one in Layout::ALL {
+        for &one in Layout::offered() {
             if ui
                 .selectable_label(layout == one, one.name())
                 .on_hover_text("Key V")
@@ -235,7 +236,8 @@ impl Middle {
                 .on_hover_text(format!("Key G: {name} in the slices, or simulated ultrasound"));
         }
         ui.menu_button("3D view", |ui| self.solid_menu(ui, shown, actions));
-        let pressed = Press("Picture", "F12: saves the window as PNG").ui(ui, true);
+        // A page saves no files.
+        let pressed = !IN_PAGE && Press("Picture", "F12: saves the window as PNG").ui(ui, true);
         actions.extend(pressed.then_some(Action::SavePicture));
     }
 

@@ -162,7 +162,11 @@ fn rules_for_devices_name_the_vendors_that_the_programs_look_for() {
     for (rules, source, vendors) in [
         ("70-stylet-haptic.rules", "hw/src/libhd/diagnose/port.rs", &["2988"][..]),
         ("70-stylet-haptic.rules", "hw/src/drd/diagnose.rs", &["1451"]),
-        ("70-stylet.rules", "host-ui/controllers/src/found.rs", &["256f", "046d"]),
+        (
+            "70-stylet.rules",
+            "host-ui/controllers/src/system/found.rs",
+            &["256f", "046d"],
+        ),
     ] {
         let rules = text(&files[&format!("/usr/lib/udev/rules.d/{rules}")]);
         let source = text(&repository(source));

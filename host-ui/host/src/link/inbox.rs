@@ -8,11 +8,11 @@ use super::{Answer, SceneModel, Snapshot};
 use std::collections::VecDeque;
 use std::mem::take;
 use std::sync::Arc;
-use std::time::Instant;
 use stylet_shm_schema::{
     Class, Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Relayed, SecondRecord, SecondState, Session,
     TickRecord,
 };
+use web_time::Instant;
 
 /// Most records queued for the host: five minutes at 1 kHz, 72 MB.
 pub const RECORDS_KEPT: usize = 300_000;
@@ -139,6 +139,28 @@ impl Inbox {
 
     pub fn put_event(&mut self, event: Event) {
         self.of(event.session_id).put_event(event);
+    }
+
+    /// Takes a scene; `None` counts as invalid.
+    pub fn put_scene(&mut self, scene: Option<SceneModel>) {
+        match scene {
+            Some(scene) => {
+                let run = self.of(scene.header.session_id);
+                run.scene = Some(Arc::new(scene));
+            }
+            None => self.invalid_dropped += 1,
+        }
+    }
+
+    /// Takes a snapshot; `None` counts as invalid.
+    pub fn put_snapshot(&mut self, snapshot: Option<Snapshot>) {
+        match snapshot {
+            Some(snapshot) => {
+                let run = self.of(snapshot.header.session_id);
+                run.snapshot = Some(Arc::new(snapshot));
+            }
+            None => self.invalid_dropped += 1,
+        }
     }
 
     pub fn put_answer(&mut self, command_id: u64, answer: Answer) {

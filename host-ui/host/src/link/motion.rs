@@ -3,8 +3,8 @@
 //! Renewal is tied to the host's own calls of `poll`, not to the receiving thread, which would outlive a hung host.
 
 use super::Answer;
-use std::time::{Duration, Instant};
 use stylet_shm_schema::{Event, EventKind, Request, VALID_RANGE_S};
+use web_time::{Duration, Instant};
 
 /// Number of polls over which the host's pauses are measured.
 const POLLS: usize = 16;
@@ -14,9 +14,6 @@ const FORESEEN: usize = 2;
 /// Length of a promise in pauses, and number of renewals within it.
 const PAUSES: f64 = 1.5;
 const RENEWALS: u32 = 3;
-/// Interval at which the program's promise is passed on in short ones, s.
-const RENEW_EVERY: Duration = Duration::from_millis(8);
-const LONGEST_RENEWAL_S: f64 = 0.03;
 /// Greatest depth of a needle, m.
 const LONGEST_DRAW_M: f64 = 0.5;
 
@@ -139,33 +136,6 @@ impl Motions {
     }
 }
 
-/// Passes the program's promise on in short ones, from the thread that owns the ports: a killed or suspended process
-/// leaves no long promise behind.
-#[derive(Default)]
-pub struct Renewals {
-    /// End of the program's promise.
-    until: Option<Instant>,
-    renewed: Option<Instant>,
-}
-
-impl Renewals {
-    /// Records a promise of the program.
-    pub fn promise(&mut self, until: Instant) {
-        (self.until, self.renewed) = (Some(until), None);
-    }
-
-    /// Returns the renewal that is due.
-    pub fn due(&mut self, now: Instant) -> Option<Request> {
-        let left = self.until?.checked_duration_since(now)?;
-        if self.renewed.is_some_and(|at| now - at < RENEW_EVERY) {
-            return None;
-        }
-        self.renewed = Some(now);
-        let valid_s = left.as_secs_f64().clamp(VALID_RANGE_S[0], LONGEST_RENEWAL_S);
-        Some(Request::KeepMoving { valid_s })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -226,22 +196,6 @@ mod tests {
             assert!((last[1].1 - valid_s).abs() < 1e-9, "{pause_ms} ms: {last:?}");
             assert_eq!(last[1].0 - last[0].0, every, "{pause_ms} ms");
         }
-    }
-
-    /// A window with frames of 150 ms promised 225 ms, and its hand moved on for 8 mm after it was killed.
-    #[test]
-    fn a_long_promise_is_passed_on_in_short_ones_and_ends() {
-        let (mut renewals, now) = (Renewals::default(), Instant::now());
-        assert_eq!(renewals.due(now), None, "nothing was promised");
-        renewals.promise(now + Duration::from_millis(225));
-        let mut sent = Vec::new();
-        for ms in 0..400 {
-            if let Some(Request::KeepMoving { valid_s }) = renewals.due(now + Duration::from_millis(ms)) {
-                assert!((0.02..=0.03).contains(&valid_s), "{valid_s}");
-                sent.push(ms);
-            }
-        }
-        assert_eq!((sent.len(), sent[1], sent.last()), (29, 8, Some(&224)));
     }
 
     #[test]

@@ -1,16 +1,15 @@
 //! Plays a recording like a core: a thread puts its messages into the inbox, each at its time.
 
 use super::inbox::Inbox;
-use super::second;
 use super::thread::lock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
 use stylet_shm_schema::{
-    Event, EventKind, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord,
+    Event, EventKind, HapticState, ParametersInForce, PlanInForce, SecondRecord, SecondState, Session, TickRecord,
 };
+use web_time::{Duration, Instant};
 
-pub use stylet_recordings::{Piece, Played};
+pub use stylet_recordings::{Piece, Played, RecordingError, ShowError, played, played_of};
 
 const PASS: Duration = Duration::from_millis(4);
 /// Interval of the heartbeat, without which the host would consider the core silent while the recording is paused.
@@ -207,7 +206,7 @@ fn put(inbox: &mut Inbox, piece: &Piece, session_id: u64, last: &mut Option<Tick
         Piece::Event(event) => inbox.put_event(Event { session_id, ..**event }),
         Piece::Second(record) => {
             let record = SecondRecord { session_id, ..**record };
-            run.second_state = Some(second::carry(&record, run.second_state.as_ref()));
+            run.second_state = Some(carry_second(&record, run.second_state.as_ref()));
             inbox.put_second_record(record);
         }
         Piece::State(found) => {
@@ -241,4 +240,18 @@ fn carry(record: &TickRecord, state: &mut HapticState) {
     (state.depth_m, state.speed_m_per_s) = (record.depth_m, record.speed_m_per_s);
     (state.force_terms_n, state.tissue_tick) = (record.force_terms_n, record.tissue_tick);
     state.tip_deflection_m = record.tip_deflection_m;
+}
+
+/// Copies the fields of a tick of the second device to its state; the rest stays unchanged, or zero.
+fn carry_second(record: &SecondRecord, before: Option<&SecondState>) -> SecondState {
+    let mut state = before.copied().unwrap_or(bytemuck::Zeroable::zeroed());
+    (state.tick, state.time_ns) = (record.tick, record.due_ns + record.wake_latency_ns);
+    (state.tip_in_scene_m, state.world_from_tool) = (record.tip_in_scene_m, record.world_from_tool);
+    (state.force_on_hand_n, state.torque_on_hand_nm) = (record.force_on_hand_n, record.torque_on_hand_nm);
+    let force_n = record.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+    state.peak_force_n = state.peak_force_n.max(force_n);
+    state.missed_deadlines += u64::from(record.missed);
+    (state.fault, state.flags, state.buttons) = (record.fault, record.flags, record.buttons);
+    state.tissue_tick = record.tissue_tick;
+    state
 }

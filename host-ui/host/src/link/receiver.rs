@@ -4,16 +4,17 @@
 //! thread polls every two milliseconds.
 
 use super::inbox::Inbox;
-use super::motion::Renewals;
+use super::intake::{Intake, Published, is_usable};
+use super::outgoing::Outgoing;
 use super::ports::Ports;
-use super::received::answer_of;
+use super::renewals::Renewals;
 use super::second::SecondEnds;
 use super::thread::lock;
 use super::{ABSENT_AFTER, Snapshot, UNANSWERED};
 use std::sync::{Arc, Mutex, mpsc};
-use std::time::{Duration, Instant};
 use stylet_ports::{self as service, Node, ServiceError, SlicePublisher, StateReader};
 use stylet_shm_schema::*;
+use web_time::{Duration, Instant};
 
 const CLEAN_EVERY: Duration = Duration::from_secs(1);
 const CLEAN_AFTER: Duration = Duration::from_millis(300);
@@ -23,15 +24,6 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 const DEAF_AFTER: Duration = Duration::from_millis(1500);
 const CONNECT_AGAIN_AFTER: Duration = Duration::from_millis(250);
 const OPEN_BOARD_EVERY: Duration = Duration::from_millis(20);
-
-/// A message of the host to the core.
-pub enum Outgoing {
-    Command(Box<Command>),
-    /// This host's motions continue until then, as long as this process runs.
-    Promise(Instant),
-    Upload(Box<UploadHeader>, Vec<u8>),
-    Lease(LeaseOrder),
-}
 
 /// The thread's side: one pass over all ports at a time.
 pub struct Passes {
@@ -45,10 +37,7 @@ pub struct Passes {
     inbox: Arc<Mutex<Inbox>>,
     asked: mpsc::Receiver<Outgoing>,
     renewals: Renewals,
-    session: Option<Session>,
-    tick: u64,
-    /// The newest record: a restarted bridge sends older ones again.
-    record_tick: u64,
+    intake: Intake,
     looked: Option<Instant>,
     /// When state and records last advanced, or the ports were made.
     heard: [(u64, Instant); 2],
@@ -80,9 +69,7 @@ impl Passes {
             inbox,
             asked,
             renewals: Renewals::default(),
-            session: None,
-            tick: 0,
-            record_tick: 0,
+            intake: Intake::of(host_id),
             looked: None,
             heard: [(0, Instant::now()); 2],
             connect_failed: None,
@@ -125,7 +112,7 @@ impl Passes {
         if self.ports.is_some() || !long_ago(self.connect_failed, CONNECT_AGAIN_AFTER) {
             return;
         }
-        let node = match self.session {
+        let node = match self.intake.session() {
             Some(_) => Node::join_again(&self.instance),
             None => Node::join(&self.instance),
         };
@@ -159,7 +146,7 @@ impl Passes {
     /// complaint.
     fn complain(&mut self, now: Instant) {
         let Some(ports) = &self.ports else { return };
-        for (heard, tick) in self.heard.iter_mut().zip([self.tick, self.record_tick]) {
+        for (heard, tick) in self.heard.iter_mut().zip(self.intake.ticks()) {
             if heard.0 != tick {
                 *heard = (tick, now);
             }
@@ -230,56 +217,26 @@ impl Passes {
     fn receive(&mut self, ports: &Ports) {
         self.receive_session(ports);
         let snapshot = self.receive_snapshot(ports);
-        let scene = ports.scenes();
-        let id = self.session.map(|s| s.session_id);
-        let mut invalid = 0;
+        let scenes = ports.scenes();
         let inbox = &mut *lock(&self.inbox);
         while let Some(batch) = ports.records.receive() {
-            for record in batch.values() {
-                match check::record(record) {
-                    Ok(()) if id == Some(record.session_id) && record.tick > self.record_tick => {
-                        self.record_tick = record.tick;
-                        inbox.put_record(*record);
-                    }
-                    Ok(()) => {}
-                    Err(_) => invalid += 1,
-                }
-            }
+            self.intake.take(inbox, Published::Records(batch.values()));
         }
-        let is_event = |event: &Event| {
-            let finite = event.value.is_finite() && event.position_m.iter().all(|c| c.is_finite());
-            finite && EventKind::from_number(event.kind).is_some()
-        };
-        for event in valid(|| ports.events.receive(), is_event, &mut invalid) {
-            inbox.put_event(event);
+        while let Some(event) = ports.events.receive() {
+            self.intake.take(inbox, Published::Event(&event));
         }
         // Before the replies: a host that has the reply to a rehearsal has its result.
-        let is_own = |session_id: u64, host_id: u64| (Some(session_id), host_id) == (id, self.host_id);
-        for rehearsal in valid(
-            || ports.rehearsals.receive(),
-            |r| check::rehearsal(r).is_ok(),
-            &mut invalid,
-        ) {
-            if is_own(rehearsal.session_id, rehearsal.host_id) {
-                inbox.put_rehearsal(rehearsal);
-            }
+        while let Some(rehearsal) = ports.rehearsals.receive() {
+            self.intake.take(inbox, Published::Rehearsal(&rehearsal));
         }
         while let Some(reply) = ports.replies.receive() {
-            match answer_of(&reply) {
-                _ if !is_own(reply.session_id, reply.host_id) => {}
-                Some(answer) => inbox.put_answer(reply.command_id, answer),
-                None => invalid += 1,
-            }
+            self.intake.take(inbox, Published::Reply(&reply));
         }
-        for p in valid(
-            || ports.parameters.receive(),
-            |p| check::parameters(p).is_ok(),
-            &mut invalid,
-        ) {
-            inbox.of(p.session_id).parameters = Some(p);
+        while let Some(parameters) = ports.parameters.receive() {
+            self.intake.take(inbox, Published::Parameters(&parameters));
         }
-        for plan in valid(|| ports.plan.receive(), |p| check::plan(p).is_ok(), &mut invalid) {
-            inbox.of(plan.session_id).plan = Some(plan);
+        while let Some(plan) = ports.plan.receive() {
+            self.intake.take(inbox, Published::Plan(&plan));
         }
         while let Some(relayed) = ports.relayed.receive() {
             inbox.of(relayed.session_id).relayed = Some(relayed);
@@ -288,43 +245,28 @@ impl Passes {
             let run = inbox.of(class.session_id);
             run.class = Some((Instant::now(), Arc::new(class)));
         }
-        let inconsistent = scene.iter().filter(|scene| scene.is_none()).count();
-        invalid += inconsistent as u64 + u64::from(matches!(snapshot, Some(None)));
-        for scene in scene.into_iter().flatten() {
-            let run = inbox.of(scene.header.session_id);
-            run.scene = Some(Arc::new(scene));
+        for scene in scenes {
+            inbox.put_scene(scene);
         }
-        if let Some(snapshot) = snapshot.flatten() {
-            let run = inbox.of(snapshot.header.session_id);
-            run.snapshot = Some(Arc::new(snapshot));
+        if let Some(snapshot) = snapshot {
+            inbox.put_snapshot(snapshot);
         }
-        inbox.invalid_dropped += invalid;
     }
 
+    /// Takes the newest announcement: those of two publishers, a dead one and its successor, do not arrive in time order.
     fn receive_session(&mut self, ports: &Ports) {
-        let mut newest = None;
-        while let Some(session) = ports.session.receive() {
-            if session.schema_version == SCHEMA_VERSION && session.period_ns > 0 {
-                // Messages of two publishers, a dead one and its successor, do not arrive in time order.
-                if newest.is_none_or(|n: Session| n.time_ns <= session.time_ns) {
-                    newest = Some(session);
-                }
-            } else {
-                lock(&self.inbox).invalid_dropped += 1;
-            }
+        let sessions = std::iter::from_fn(|| ports.session.receive());
+        let (usable, others): (Vec<_>, Vec<_>) = sessions.partition(is_usable);
+        let inbox = &mut *lock(&self.inbox);
+        inbox.invalid_dropped += others.len() as u64;
+        let Some(newest) = usable.into_iter().max_by_key(|session| session.time_ns) else {
+            return;
+        };
+        // Everything of an earlier run is dropped before anything of the new one is opened.
+        if self.intake.take(inbox, Published::Session(&newest)) {
+            (self.board, self.board_tried) = (None, None);
+            self.second.close();
         }
-        let Some(session) = newest else { return };
-        match &self.session {
-            Some(old) if old.session_id == session.session_id => lock(&self.inbox).run.session = Some(session),
-            Some(old) if old.started_ns > session.started_ns => return,
-            // Everything of an earlier run is dropped before anything of the new one is opened.
-            _ => {
-                (self.board, self.board_tried, self.tick, self.record_tick) = (None, None, 0, 0);
-                self.second.close();
-                lock(&self.inbox).begin(session);
-            }
-        }
-        self.session = Some(session);
     }
 
     /// Returns the newest snapshot; the inner `None` marks an inconsistent one.
@@ -342,7 +284,7 @@ impl Passes {
     }
 
     fn read_board(&mut self, ports: &Ports) {
-        let Some(session) = &self.session else { return };
+        let Some(session) = self.intake.session() else { return };
         if self.board.is_none() && self.board_tried.is_none_or(|t| t.elapsed() >= OPEN_BOARD_EVERY) {
             self.board_tried = Some(Instant::now());
             self.board = StateReader::open(&ports.node, session.session_id).ok();
@@ -352,18 +294,12 @@ impl Passes {
         let state = board.read();
         let inbox = &mut *lock(&self.inbox);
         inbox.invalid_dropped += self.second.receive(session.session_id, inbox);
-        match check::state(&state) {
-            Ok(()) => {
-                self.tick = state.tick;
-                inbox.run.state = Some(state);
-            }
-            Err(_) => inbox.invalid_dropped += 1,
-        }
+        self.intake.take(inbox, Published::State(&state));
     }
 
     fn feel_pulse(&mut self) {
-        if let Some(session) = &self.session {
-            let beat = (session.time_ns, self.tick);
+        if let Some(session) = self.intake.session() {
+            let beat = (session.time_ns, self.intake.ticks()[0]);
             if self.beat != Some(beat) {
                 self.beat = Some(beat);
                 self.beat_moved = Some(Instant::now());
@@ -388,11 +324,4 @@ impl Passes {
             }
         }
     }
-}
-
-/// Returns the valid ones of all that arrived; counts the others.
-fn valid<T>(receive: impl FnMut() -> Option<T>, is_valid: impl Fn(&T) -> bool, invalid: &mut u64) -> Vec<T> {
-    let (valid, others): (Vec<T>, Vec<T>) = std::iter::from_fn(receive).partition(is_valid);
-    *invalid += others.len() as u64;
-    valid
 }

@@ -1,9 +1,9 @@
 //! The receiving thread's side of the second device, in a run that has one.
 
 use super::inbox::Inbox;
-use std::time::{Duration, Instant};
 use stylet_ports::{self as service, Node, SliceSubscriber, StateReader};
 use stylet_shm_schema::{SecondRecord, SecondState, Session, check};
+use web_time::{Duration, Instant};
 
 const OPEN_EVERY: Duration = Duration::from_millis(100);
 
@@ -65,18 +65,4 @@ impl SecondEnds {
         }
         invalid
     }
-}
-
-/// Copies the fields of a tick to the state; the rest stays unchanged, or zero.
-pub fn carry(record: &SecondRecord, before: Option<&SecondState>) -> SecondState {
-    let mut state = before.copied().unwrap_or(bytemuck::Zeroable::zeroed());
-    (state.tick, state.time_ns) = (record.tick, record.due_ns + record.wake_latency_ns);
-    (state.tip_in_scene_m, state.world_from_tool) = (record.tip_in_scene_m, record.world_from_tool);
-    (state.force_on_hand_n, state.torque_on_hand_nm) = (record.force_on_hand_n, record.torque_on_hand_nm);
-    let force_n = record.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt();
-    state.peak_force_n = state.peak_force_n.max(force_n);
-    state.missed_deadlines += u64::from(record.missed);
-    (state.fault, state.flags, state.buttons) = (record.fault, record.flags, record.buttons);
-    state.tissue_tick = record.tissue_tick;
-    state
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 use bytemuck::Zeroable;
-use std::time::Instant;
+use stylet_files::LabelVolume;
 use stylet_ports::{self as service, Meeting, StateWriter};
 
 /// A name whose shared memory is removed at the end; drop it last.

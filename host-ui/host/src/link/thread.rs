@@ -1,80 +1,92 @@
-//! The thread of a link and the host's side of it: it receives from a core, or plays a recording.
+//! The receiving side of a link: it receives from a core, or plays a recording.
 
+use super::here::{Here, LocalCore};
 use super::inbox::{Inbox, Pulse};
+use super::outgoing::Outgoing;
 use super::player::{Playback, Played, Player};
-use super::receiver::{Outgoing, Passes};
-use std::sync::atomic::{AtomicBool, Ordering};
+#[cfg(not(target_family = "wasm"))]
+use super::receiver::Passes;
+use super::worker::Worker;
+use std::fmt::Display;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
-use std::thread::JoinHandle;
-use std::time::Duration;
 use stylet_shm_schema::Instance;
+use web_time::Duration;
 
+#[cfg(not(target_family = "wasm"))]
 const PASS: Duration = Duration::from_millis(2);
-/// Most messages of the host queued for the sending thread.
+/// Time between two calls where there is no core.
+const NO_CORE: Duration = Duration::from_secs(1);
+/// Most messages of the host queued for the receiving side.
 const OUTGOING: usize = 64;
 
-/// The host's side of the thread; dropping it ends the thread and closes the ports.
+/// The host's side of the receiver; dropping it ends its thread and closes the ports.
 pub struct Receiver {
     inbox: Arc<Mutex<Inbox>>,
     outgoing: mpsc::SyncSender<Outgoing>,
-    end: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    worker: Option<Worker>,
 }
 
 impl Receiver {
+    /// Receives nothing: a web page has no shared memory.
+    #[cfg(target_family = "wasm")]
+    pub fn start(_instance: Instance, _host_id: u64, _snapshots_every: Duration) -> Self {
+        let receiver = Self::of("link", |_, _| || NO_CORE);
+        lock(&receiver.inbox).pulse.trouble = Some("a web page reaches no rt-core".to_owned());
+        receiver
+    }
+
+    /// Receives through the shared memory of `instance`.
+    #[cfg(not(target_family = "wasm"))]
     pub fn start(instance: Instance, host_id: u64, snapshots_every: Duration) -> Self {
-        let inbox = Arc::new(Mutex::new(Inbox::default()));
-        let (outgoing, asked) = mpsc::sync_channel(OUTGOING);
-        let into = Arc::clone(&inbox);
         // Made by the thread, as the ports are.
-        let make = move || {
-            let mut passes = Passes::new((instance, host_id), snapshots_every, into, asked);
+        Self::of("link", move |inbox, asked| {
+            let mut passes = Passes::new((instance, host_id), snapshots_every, inbox, asked);
             move || {
                 passes.pass();
                 PASS
             }
-        };
-        Self::with_thread("link", inbox, outgoing, make)
+        })
     }
 
     /// Plays a recording; requests are ignored.
     pub fn play(played: Arc<Played>, playback: Playback) -> Self {
-        let inbox = Arc::new(Mutex::new(Inbox::default()));
-        let (outgoing, _) = mpsc::sync_channel(OUTGOING);
-        let mut player = Player::new(played, playback, Arc::clone(&inbox));
-        Self::with_thread("player", inbox, outgoing, move || move || player.pass())
+        Self::of("player", move |inbox, _| {
+            let mut player = Player::new(played, playback, inbox);
+            move || player.pass()
+        })
     }
 
-    /// Starts a thread that calls the function made by `make` repeatedly, waiting in between for the returned time.
-    fn with_thread<P: FnMut() -> Duration>(
+    /// Runs a core in this process, made where it runs.
+    pub fn here<C: LocalCore, E: Display>(host_id: u64, make: impl FnOnce() -> Result<C, E> + Send + 'static) -> Self {
+        Self::of("core", move |inbox, asked| {
+            let made = make().map_err(|why| lock(&inbox).pulse.trouble = Some(why.to_string()));
+            let mut here = made.ok().map(|core| Here::new(core, host_id, inbox, asked));
+            move || here.as_mut().map_or(NO_CORE, Here::pass)
+        })
+    }
+
+    /// Calls the function made by `make` repeatedly, waiting in between for the returned time.
+    fn of<P: FnMut() -> Duration + 'static>(
         name: &str,
-        inbox: Arc<Mutex<Inbox>>,
-        outgoing: mpsc::SyncSender<Outgoing>,
-        make: impl FnOnce() -> P + Send + 'static,
+        make: impl FnOnce(Arc<Mutex<Inbox>>, mpsc::Receiver<Outgoing>) -> P + Send + 'static,
     ) -> Self {
-        let end = Arc::new(AtomicBool::new(false));
-        let ended = Arc::clone(&end);
-        let work = move || {
-            let mut pass = make();
-            // SYNC: set when the host drops its side; nothing but the flag is carried.
-            while !ended.load(Ordering::Relaxed) {
-                std::thread::park_timeout(pass());
-            }
-        };
-        let thread = std::thread::Builder::new().name(name.to_owned()).spawn(work);
-        if let Err(why) = &thread {
+        let inbox = Arc::new(Mutex::new(Inbox::default()));
+        let (outgoing, asked) = mpsc::sync_channel(OUTGOING);
+        let into = Arc::clone(&inbox);
+        let worker = Worker::start(name, move || make(into, asked));
+        if let Err(why) = &worker {
             lock(&inbox).pulse.trouble = Some(format!("no thread could be started to receive: {why}"));
         }
         Self {
             inbox,
             outgoing,
-            end,
-            thread: thread.ok(),
+            worker: worker.ok(),
         }
     }
 
     /// Takes everything received since the last call.
     pub fn take(&self) -> Inbox {
+        self.worker.iter().for_each(Worker::turn);
         lock(&self.inbox).take()
     }
 
@@ -86,22 +98,8 @@ impl Receiver {
     /// Queues a message; false if the queue is full.
     pub fn send(&self, outgoing: Outgoing) -> bool {
         let accepted = self.outgoing.try_send(outgoing).is_ok();
-        if let Some(thread) = &self.thread {
-            thread.thread().unpark();
-        }
+        self.worker.iter().for_each(Worker::wake);
         accepted
-    }
-}
-
-impl Drop for Receiver {
-    fn drop(&mut self) {
-        // SYNC: read by the thread; nothing but the flag is carried.
-        self.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            thread.thread().unpark();
-            // A panic there was reported when it happened.
-            let _ended = thread.join();
-        }
     }
 }
 

@@ -12,16 +12,15 @@ mod writer;
 
 pub use error::RecordError;
 pub use export::{Export, export};
-pub use stylet_recordings::{FileProblem, Gap, Gaps, ShowError, played_of, read};
+pub use stylet_recordings::{FileProblem, Gap, Gaps, read};
 
 use crate::link::{Link, LinkError, LinkStatus};
 use clap::Args;
 use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
-use stylet_recordings::Played;
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::Request;
 use writer::{Totals, Writer};
@@ -54,11 +53,6 @@ pub struct Options {
     /// while it rests, and 17 while the gland is undisturbed
     #[arg(long, default_value_t = 20.0, value_name = "HZ")]
     snapshot_rate: f64,
-}
-
-/// Reads a recording for a window; refuses one without a scene.
-pub fn played(path: &Path, interrupt: &Interrupt) -> Result<Played, RecordError> {
-    Ok(stylet_recordings::played(path, interrupt)?)
 }
 
 /// Records until the time is up or it is interrupted; fails if a tick was lost on the way.

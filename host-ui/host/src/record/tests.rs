@@ -1,7 +1,7 @@
 //! Reports of a recording on what it lost.
 
 use super::*;
-use crate::link::{Piece, SceneModel, Snapshot};
+use crate::link::{Piece, SceneModel, Snapshot, played, played_of};
 use bytemuck::Zeroable;
 use std::sync::Arc;
 use stylet_shm_schema::{

@@ -2,13 +2,13 @@
 
 use super::{Needle, SEED_LENGTH_M};
 use serde::{Deserialize, Serialize};
-use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, LinkError, LinkStatus};
 use stylet_procedure::{NeedleWay, Pace};
 use stylet_shm_schema::{
     MAX_EARLIER_NEEDLES, NeedleRehearsal, Reason, Refusal, RefusalCode, Request, StabilisingNeedle,
 };
+use web_time::{Duration, Instant};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 /// Time limit of a rehearsal; the largest scene takes a second for a second.

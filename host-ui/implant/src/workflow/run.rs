@@ -6,13 +6,13 @@ use crate::pairing;
 use crate::plan::stabilise::{Stabilising, first_left, shows_left};
 use crate::plan::{Drops, ImplantPlan};
 pub use failure::{RunError, RunFailure, RunStatus};
-use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkError, LinkStatus};
 use stylet_procedure::{
     Done, HandRequest, NeedleWay, Next, Observed, Pace, Patience, Procedure, Reply, Step, StepFailure, Waiting,
     needle_inside,
 };
 use stylet_shm_schema::{Event, EventKind, Fault, HapticState, NeedleAxis, PlannedNeedle, RefusalCode, Request};
+use web_time::{Duration, Instant};
 
 /// Longest absence of a core that is tolerated: a busy machine may delay it.
 const ABSENT_LIMIT: Duration = Duration::from_secs(10);

@@ -16,8 +16,7 @@ use image::imageops::{FilterType, replace, resize};
 use std::path::PathBuf;
 use std::sync::Arc;
 use stylet_base::interrupt::Interrupt;
-use stylet_host::link::{Piece, SceneModel, Snapshot};
-use stylet_host::record::played_of;
+use stylet_host::link::{Piece, SceneModel, Snapshot, played_of};
 
 /// Sizes of the window in pixels: the smallest possible, and those of common screens.
 const SIZES: [[u32; 2]; 5] = [[960, 600], [1280, 720], [1366, 768], [1920, 1080], [3840, 2160]];

@@ -2,6 +2,7 @@
 
 use super::WorkflowState;
 use super::job::{job_ui, waiting_ui};
+use crate::IN_PAGE;
 use crate::action::{Action, WatchAction};
 use crate::dialog::Purpose;
 use crate::panel::field::path_ui;
@@ -99,6 +100,10 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
         if example.clicked() {
             actions.push(Action::Watch(WatchAction::Example));
         }
+        if IN_PAGE {
+            ui.label(theme::small("or drop a recording here"));
+            return;
+        }
         let other = Press(
             "recording…",
             "A recording made by \"host-ui record\", or drop one on the window",
@@ -106,6 +111,38 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
         .ui(ui, can_watch);
         actions.extend(other.then_some(Action::PickFile(Purpose::Recording)));
     });
+    if !IN_PAGE {
+        files_ui(ui, shown, state, (free, &label), actions);
+    }
+    let mut cancel = false;
+    match &shown.load {
+        LoadState::Idle => {}
+        LoadState::Reading(what, share) => cancel = job_ui(ui, what, Some(*share)),
+        // The core does not interrupt the building of a scene.
+        LoadState::Sending(what) => drop(ui.horizontal(|ui| waiting_ui(ui, what))),
+        LoadState::Loaded(what) => {
+            ui.label(RichText::new(what).small().color(tokens.good));
+        }
+        LoadState::Refused(why) => {
+            ui.label(RichText::new(why).small().color(tokens.bad));
+        }
+    }
+    if cancel {
+        actions.push(Action::CancelLoad);
+    }
+    if let Some(scene) = shown.scene.as_ref().filter(|s| s.structures().len() > 1) {
+        structures_ui(ui, scene);
+    }
+}
+
+/// Draws the field of a scene's or an image's file, and its buttons.
+fn files_ui(
+    ui: &mut egui::Ui,
+    shown: &Shown,
+    state: &mut WorkflowState,
+    (free, label): (bool, &egui::Response),
+    actions: &mut Vec<Action>,
+) {
     let entered = ui.horizontal(|ui| {
         let width = ui.available_width() - OPEN_WIDTH;
         let field = path_ui(ui, "scene file", &mut state.scene_path, "file, or drop one here", width);
@@ -132,25 +169,6 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
             actions.push(Action::LoadImage(PathBuf::from(path)));
         }
     });
-    let mut cancel = false;
-    match &shown.load {
-        LoadState::Idle => {}
-        LoadState::Reading(what, share) => cancel = job_ui(ui, what, Some(*share)),
-        // The core does not interrupt the building of a scene.
-        LoadState::Sending(what) => drop(ui.horizontal(|ui| waiting_ui(ui, what))),
-        LoadState::Loaded(what) => {
-            ui.label(RichText::new(what).small().color(tokens.good));
-        }
-        LoadState::Refused(why) => {
-            ui.label(RichText::new(why).small().color(tokens.bad));
-        }
-    }
-    if cancel {
-        actions.push(Action::CancelLoad);
-    }
-    if let Some(scene) = shown.scene.as_ref().filter(|s| s.structures().len() > 1) {
-        structures_ui(ui, scene);
-    }
 }
 
 /// Draws the dialogs, and the recent files.

@@ -1,6 +1,7 @@
 //! Finds gamepads and 3D mice through sysfs, without opening a device and without rights.
 
-use super::kind::{Abilities, Bits, Kind};
+use super::abilities::{Abilities, Bits};
+use crate::kind::Kind;
 use std::path::{Path, PathBuf};
 
 /// Longest name that is shown whole.

@@ -1,6 +1,7 @@
 //! Two fake gamepads: control, unplugging and missing rights.
 
 use super::*;
+use crate::kind::Kind;
 use evdev::{AbsInfo, AbsoluteAxisCode, AttributeSet, EventType, KeyCode};
 use std::cell::RefCell;
 use std::collections::VecDeque;

@@ -3,8 +3,10 @@
 
 use super::error::OpenError;
 use super::found::Found;
-use super::kind::{Button, Kind};
-use super::state::{DeviceState, ProbeWish, State, Taken, Wish};
+use super::state::{DeviceState, State, Taken};
+use crate::kind::Button;
+use crate::latest::{Device, Latest};
+use crate::wish::{ProbeWish, Wish};
 use evdev::InputEvent;
 use std::io::{self, ErrorKind};
 use std::path::PathBuf;
@@ -32,38 +34,6 @@ pub trait OpenDevice {
     fn fetch(&mut self, into: &mut Vec<InputEvent>) -> io::Result<()>;
     /// Returns the present state of its axes and keys.
     fn state(&self) -> io::Result<DeviceState>;
-}
-
-/// Device as the window shows it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Device {
-    /// Display name.
-    pub name: String,
-    /// Kind of the device.
-    pub kind: Kind,
-    /// True once the stick or the cap has been at rest; only then does the needle follow it.
-    pub was_released: bool,
-}
-
-/// State of the last reading, for the window.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Latest {
-    /// Device that controls the needle: the one that was moved last.
-    pub holder: Option<Device>,
-    /// Speed that this device requests.
-    pub wish: Wish,
-    /// Device that controls the probe, in a run with two hands.
-    pub probe_holder: Option<Device>,
-    /// Speed that this device requests.
-    pub probe: ProbeWish,
-    /// Number of presses of each of [`Button::ALL`] since the start.
-    pub presses: [u32; Button::ALL.len()],
-    /// Devices that cannot be read, each with the reason and the remedy.
-    pub denied: Vec<String>,
-    /// Name of the device that was unplugged last.
-    pub disconnected: String,
-    /// Number of devices that were unplugged since the start.
-    pub disconnections: u32,
 }
 
 struct Held<O> {

@@ -2,8 +2,6 @@
 
 use evdev::AbsInfo;
 
-/// Slowest speed of a hand that the core accepts.
-pub const SLOWEST_M_PER_S: f64 = 1e-4;
 /// Smallest dead zone, as a share of the range. Many drivers report none (`flat`), or one that a
 /// worn stick exceeds.
 const LEAST_DEAD: f64 = 0.08;

@@ -2,8 +2,9 @@
 
 use super::error::{ListError, OpenError};
 use super::found::{Found, Places, find};
-use super::kind::Kind;
-use super::{DeviceSource, OpenDevice, System};
+use super::hub::{DeviceSource, OpenDevice};
+use super::reader::System;
+use crate::kind::Kind;
 
 /// Prints the devices; returns `Err` with the remedy if one cannot be read.
 pub fn list() -> Result<(), ListError> {

@@ -2,9 +2,11 @@
 //! waits.
 
 use super::found::{Found, Places, find};
-use super::hub::{DeviceHub, DeviceSource, Latest, OpenDevice};
-use super::kind::Button;
-use super::state::{DeviceState, ProbeWish, Wish};
+use super::hub::{DeviceHub, DeviceSource, OpenDevice};
+use super::state::DeviceState;
+use crate::kind::Button;
+use crate::latest::Latest;
+use crate::wish::{ProbeWish, Wish};
 use evdev::InputEvent;
 use evdev::raw_stream::RawDevice;
 use std::io;

@@ -1,8 +1,9 @@
 //! The state of one device from its events, and the speed that it requests. Needs no device.
 
 use super::axis::Axis;
-use super::kind::{Button, Kind};
-use super::{ACROSS_M_PER_S, ALONG_M_PER_S, SLOW, SLOWEST_M_PER_S, TURN_RAD_PER_S};
+use crate::kind::{Button, Kind};
+use crate::wish::{ProbeWish, SLOWEST_M_PER_S, Wish};
+use crate::{ACROSS_M_PER_S, ALONG_M_PER_S, SLOW, TURN_RAD_PER_S};
 use evdev::{
     AbsInfo, AbsoluteAxisCode, AttributeSet, EventSummary, InputEvent, KeyCode, RelativeAxisCode, SynchronizationCode,
 };
@@ -10,50 +11,6 @@ use evdev::{
 /// Silence after which a relative axis is at rest, because its driver sends no zero when the cap is
 /// released.
 const RELATIVE_SILENCE_S: f64 = 0.1;
-
-/// Requested speed of the tip.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Wish {
-    /// Along the needle, positive inwards.
-    pub along_m_per_s: f64,
-    /// Across the template, as seen from the perineum: to the right, and up.
-    pub across_m_per_s: [f64; 2],
-}
-
-impl Wish {
-    /// Request to stay in place.
-    pub const REST: Self = Self {
-        along_m_per_s: 0.0,
-        across_m_per_s: [0.0; 2],
-    };
-
-    /// Returns the same direction at a share of the speed.
-    pub fn slower(self, by: f64) -> Self {
-        Self {
-            along_m_per_s: self.along_m_per_s * by,
-            across_m_per_s: self.across_m_per_s.map(|v| v * by),
-        }
-    }
-}
-
-/// Requested speed of the ultrasound probe.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ProbeWish {
-    /// Along its axis, positive into the patient.
-    pub along_m_per_s: f64,
-    /// About its axis, positive to the patient's left.
-    pub turn_rad_per_s: f64,
-}
-
-impl ProbeWish {
-    /// Returns the same direction at a share of the speed.
-    pub fn slower(self, by: f64) -> Self {
-        Self {
-            along_m_per_s: self.along_m_per_s * by,
-            turn_rad_per_s: self.turn_rad_per_s * by,
-        }
-    }
-}
 
 /// Kernel's whole state of a device at one moment.
 #[derive(Debug, Default)]
