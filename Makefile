@@ -5,7 +5,7 @@ CARGO ?= cargo
 RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
 BIN := $(or $(CARGO_TARGET_DIR),target)/quick
 SIMULATOR = --bin rt-core --bin stylet-bridge --bin host-ui
-PRODUCTS = --bin stylet-lab --bin stylet-study --bin stylet-clinic --bin stylet-igtl
+PRODUCTS = --bin stylet-lab --bin stylet-study --bin stylet-clinic --bin stylet-igtl --bin stylet-demo
 # In the packages, not in what is built to develop: decoders of JPEG, JPEG-LS and JPEG 2000; screen readers.
 COMPRESSED = --features stylet-files/compressed
 PACKAGED = $(COMPRESSED) --features host-ui/screen-reader
@@ -174,11 +174,11 @@ python-beside: python ## Compute twenty implants also by dicompyler-core, pymedp
 # A folder that any static server can serve.
 SITE = $(abspath $(or $(CARGO_TARGET_DIR),target))/web-site
 
-web: ## Build the window for a browser, which plays recordings, into target/web-site (some minutes)
-	@docs/tools/need cargo binaryen brotli clang llvm
+web: ## Build the window and a core for a browser, into target/web-site (some minutes)
+	@docs/tools/need cargo brotli clang llvm
 	docs/tools/web $(SITE)
 
-web-test: web ## Open the page in headless Chromium in three sizes, and drop a recording onto it
+web-test: web products ## Implant five seeds in headless Chromium, in three sizes, and compare with host-ui procedure
 	@docs/tools/need chromium python3-venv
 	python3 -m venv $(SITE)-test && $(SITE)-test/bin/pip install -q playwright==1.63.0
 	$(SITE)-test/bin/python host-ui/web/check.py $(SITE) host-ui/example/insertion.mcap $(SITE)-test/pictures

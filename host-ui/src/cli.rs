@@ -14,8 +14,8 @@ use stylet_implant::procedure;
 use stylet_manual::{ManualArgs, Product};
 use stylet_shm_schema::Instance;
 
-/// Commands on files, and of OpenIGTLink.
-pub const PRODUCTS: [Product; 2] = [
+/// Commands on files, of OpenIGTLink, and the demonstration.
+pub const PRODUCTS: [Product; 3] = [
     Product {
         program: "stylet-clinic",
         commands: &[
@@ -37,11 +37,15 @@ pub const PRODUCTS: [Product; 2] = [
         program: "stylet-igtl",
         commands: &["igtl"],
     },
+    Product {
+        program: "stylet-demo",
+        commands: &["demo"],
+    },
 ];
 
 /// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.
 ///
-/// Start `rt-core` first, then `host-ui` for the window. `host-ui procedure` implants the seeds of
+/// Start `rt-core` first, then `host-ui` for the window; `host-ui demo` needs no `rt-core`. `host-ui procedure` implants the seeds of
 /// the default plan without a window and writes the results. In the window, keys, mouse, a gamepad
 /// or a 3D mouse hold the needle: F1 lists their functions, `host-ui controllers` lists the
 /// connected ones.

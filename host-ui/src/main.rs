@@ -1,16 +1,8 @@
-//! Starts the window, in a desktop or in a web page, or the procedure without one.
+//! Starts the window, or the procedure without one.
 
-#[cfg(not(target_family = "wasm"))]
 use clap::Parser;
-#[cfg(not(target_family = "wasm"))]
 use std::process::ExitCode;
 
-#[cfg(target_family = "wasm")]
-fn main() {
-    host_ui::web::start(None);
-}
-
-#[cfg(not(target_family = "wasm"))]
 fn main() -> ExitCode {
     host_ui::heap::keep_little();
     host_ui::session::name_runtime_folder();

@@ -4,15 +4,14 @@
 
 use crate::app::{App, Home, Options};
 use wasm_bindgen::{JsCast, JsValue};
-use web_sys::{Document, HtmlCanvasElement};
+use web_sys::{Blob, Document, HtmlAnchorElement, HtmlCanvasElement, Url};
 
 /// Identifiers of the elements of `web/index.html`.
 const CANVAS: &str = "window";
 const WAITING: &str = "waiting";
 
-/// Opens the window in the page's canvas, over the core that `home` connects to; without one it plays the recorded
-/// example. A failure is shown in its place.
-pub fn start(home: Option<Home>) {
+/// Opens the window in the page's canvas, over the core that `home` connects to. A failure is shown in its place.
+pub fn start(home: Home) {
     wasm_bindgen_futures::spawn_local(async move {
         let Some(document) = web_sys::window().and_then(|window| window.document()) else {
             return;
@@ -32,17 +31,23 @@ pub fn start(home: Option<Home>) {
     });
 }
 
-async fn open(document: &Document, home: Option<Home>) -> Result<(), JsValue> {
+async fn open(document: &Document, home: Home) -> Result<(), JsValue> {
     let canvas = document.get_element_by_id(CANVAS).ok_or("the page has no canvas")?;
     let canvas: HtmlCanvasElement = canvas.dyn_into().map_err(|_| "the canvas is another element")?;
-    let create: eframe::AppCreator<'static> = Box::new(move |cc| {
-        let has_core = home.is_some();
-        let mut app = App::with_home(cc, Options::default(), home);
-        if !has_core {
-            app.begin_with_example();
-        }
-        Ok(Box::new(app))
-    });
+    let create: eframe::AppCreator<'static> =
+        Box::new(move |cc| Ok(Box::new(App::with_home(cc, Options::default(), home))));
     let options = eframe::WebOptions::default();
     eframe::WebRunner::new().start(canvas, options, create).await
+}
+
+/// Hands a file to the reader, as a download.
+pub fn download(name: &str, content: &[u8]) -> Result<(), JsValue> {
+    let parts = js_sys::Array::of1(&js_sys::Uint8Array::from(content));
+    let address = Url::create_object_url_with_blob(&Blob::new_with_u8_array_sequence(&parts)?)?;
+    let document = web_sys::window().and_then(|window| window.document());
+    let link: HtmlAnchorElement = document.ok_or("no page")?.create_element("a")?.unchecked_into();
+    link.set_href(&address);
+    link.set_download(name);
+    link.click();
+    Url::revoke_object_url(&address)
 }

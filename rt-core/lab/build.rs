@@ -102,7 +102,7 @@ fn of_programs(needs: &Needs, programs: &[&str]) -> BTreeSet<Package> {
 /// Lists `name version programs licence` of each foreign package in the programs of either side, one a line.
 fn packages(needs: &Needs) -> String {
     let core = of_programs(needs, &["rt-core", "stylet-bridge", "stylet-lab", "stylet-study"]);
-    let host = of_programs(needs, &["host-ui", "stylet-clinic", "stylet-igtl"]);
+    let host = of_programs(needs, &["host-ui", "stylet-clinic", "stylet-igtl", "stylet-demo"]);
     let ours = |name: &str| name.starts_with("stylet-") || name == "rt-core" || name == "host-ui";
     let sources = sources();
     let line = |package: &Package| {

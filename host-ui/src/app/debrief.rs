@@ -18,8 +18,8 @@ use stylet_implant::received::ReceivedProcedure;
 use stylet_implant::score::{self, Implant, Motion, Score, SeedPair, seed_of};
 use stylet_shm_schema::{Prescribed, Text, TickRecord};
 
-/// Folder that was written, or the reason why it could not be.
-pub(super) type Saved = Result<PathBuf, Failure>;
+/// Name of what was written, or the reason why it could not be.
+pub(super) type Saved = Result<String, Failure>;
 /// Any error, shown as text.
 pub(super) type Failure = Box<dyn std::error::Error + Send + Sync>;
 
@@ -137,7 +137,7 @@ impl App {
         };
         self.debrief = None;
         self.shown.note = Some(match saved {
-            Ok(folder) => Note::done(format!("Debrief saved as {}", folder.display())),
+            Ok(name) => Note::done(format!("Debrief saved as {name}")),
             Err(why) => Note::refusal(why),
         });
     }
@@ -261,7 +261,7 @@ impl Delivered {
     }
 }
 
-fn write(delivered: &Delivered, folder: PathBuf) -> Result<PathBuf, Failure> {
+fn write(delivered: &Delivered, folder: PathBuf) -> Saved {
     let anatomy = Anatomy::of(&delivered.scene)?;
     let kernel = DoseKernel::new(&delivered.source, Interval::ALL);
     let score = Score::of(Implant {
@@ -278,9 +278,24 @@ fn write(delivered: &Delivered, folder: PathBuf) -> Result<PathBuf, Failure> {
         moments: delivered.moments.clone(),
         updates: delivered.updates.clone(),
     })?;
-    std::fs::create_dir_all(&folder).map_err(|e| format!("{} cannot be created ({e})", folder.display()))?;
-    score::write(&score, delivered.made()?, &folder)?;
-    Ok(folder)
+    save(&score, delivered.made()?, &folder)
+}
+
+#[cfg(not(target_family = "wasm"))]
+fn save(score: &Score, made: serde_json::Value, folder: &Path) -> Saved {
+    std::fs::create_dir_all(folder).map_err(|e| format!("{} cannot be created ({e})", folder.display()))?;
+    score::write(score, made, folder)?;
+    Ok(folder.display().to_string())
+}
+
+/// A page has no folders: its reader gets the files.
+#[cfg(target_family = "wasm")]
+fn save(score: &Score, made: serde_json::Value, _: &Path) -> Saved {
+    let files = score::files(score, made)?;
+    for (name, text) in &files {
+        crate::web::download(name, text.as_bytes()).map_err(|why| format!("no download of {name}: {why:?}"))?;
+    }
+    Ok(files.map(|(name, _)| name).join(" and "))
 }
 
 #[cfg(test)]

@@ -77,8 +77,8 @@ pub type Home = Rc<dyn Fn(Instance) -> Link>;
 /// Window of the program.
 pub struct App {
     link: Link,
-    /// Connects to the core of this window, also after a recording; `None` if it can have none.
-    home: Option<Home>,
+    /// Connects to the core of this window, also after a recording.
+    home: Home,
     #[cfg(not(target_family = "wasm"))]
     started_core: Option<core::StartedCore>,
     shown: Shown,
@@ -158,11 +158,11 @@ impl App {
 
     /// Creates the window with these options, before its first frame.
     pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
-        Self::with_home(cc, options, Some(Rc::new(Link::new)))
+        Self::with_home(cc, options, Rc::new(Link::new))
     }
 
-    /// As [`App::new`], with the core that `home` connects to; without one, recordings are shown alone.
-    pub fn with_home(cc: &eframe::CreationContext<'_>, options: Options, home: Option<Home>) -> Self {
+    /// As [`App::new`], with the core that `home` connects to.
+    pub fn with_home(cc: &eframe::CreationContext<'_>, options: Options, home: Home) -> Self {
         theme::apply(&cc.egui_ctx);
         if let Some(state) = &cc.wgpu_render_state {
             cc.egui_ctx.add_plugin(Redraw::new(state.clone()));
@@ -181,9 +181,7 @@ impl App {
         let planner = Planner::default();
         let name = options.name.unwrap_or_else(|| instance.name().to_owned());
         Self {
-            link: home
-                .as_ref()
-                .map_or_else(|| Link::new(instance.clone()), |home| home(instance.clone())),
+            link: home(instance.clone()),
             home,
             #[cfg(not(target_family = "wasm"))]
             started_core: None,

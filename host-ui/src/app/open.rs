@@ -27,7 +27,7 @@ pub fn run(options: Options, home: Home) -> Result<(), WindowError> {
     if options.without_pause {
         native.wgpu_options.surface.present_mode = eframe::wgpu::PresentMode::AutoNoVsync;
     }
-    let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::with_home(cc, options, Some(home)))));
+    let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::with_home(cc, options, home))));
     eframe::run_native("Stylet", native, create).map_err(|why| match why {
         eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => WindowError::Display(shown_on()),
         eframe::Error::Wgpu(why) => WindowError::Driver(why),

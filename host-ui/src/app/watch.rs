@@ -80,12 +80,6 @@ impl Recording {
 }
 
 impl App {
-    /// Plays the example as soon as the window opens.
-    #[cfg(target_family = "wasm")]
-    pub(crate) fn begin_with_example(&mut self) {
-        self.recording.read_example();
-    }
-
     /// Returns whether a recording is shown instead of a core.
     pub(super) fn watches(&self) -> bool {
         self.link.playback().is_some()
@@ -146,9 +140,7 @@ impl App {
         if !self.watches() {
             return;
         }
-        let Some(home) = self.home.as_ref().map(Rc::clone) else {
-            return;
-        };
+        let home = Rc::clone(&self.home);
         self.change_link(|instance| home(instance));
         if let Some(planner) = self.recording.planner.take() {
             self.planner = planner;
@@ -174,7 +166,6 @@ impl App {
             speed: playback.speed(),
             marks: playback.marks(),
             has_ended: playback.has_ended(),
-            can_close: self.home.is_some(),
         });
     }
 }

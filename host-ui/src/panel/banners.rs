@@ -75,13 +75,11 @@ fn of_recording(watched: &Watched) -> Banner {
         (false, true) => {
             "Shown as recorded; nothing can be moved. A browser has no real time, and no force for your hand."
         }
-        (true, true) => "End of recording. Drop another one onto the page (.mcap, by host-ui record).",
+        (true, true) => {
+            "End of recording. Close it and insert a needle yourself, or drop another one (.mcap, by host-ui record)."
+        }
     };
-    let banner = Banner::new(BannerLevel::Info, "A recording", text);
-    match watched.can_close {
-        true => banner.with("Close", Action::Watch(WatchAction::Close)),
-        false => banner,
-    }
+    Banner::new(BannerLevel::Info, "A recording", text).with("Close", Action::Watch(WatchAction::Close))
 }
 
 /// Returns banners for devices that were unplugged or cannot be read.
@@ -285,8 +283,8 @@ pub fn not_real_time_words(shown: &Shown) -> String {
     let advice = shown.session.map(|s| s.advice.read()).unwrap_or_default();
     let asked = shown.session.is_some_and(|s| s.no_rt_asked != 0);
     match (advice.trim(), asked) {
-        _ if IN_PAGE => {
-            "A browser has no real time: motion and force are computed late, and no device renders the force."
+        _ if shown.is_stepped() => {
+            "The core is stepped by this window: motion and force are computed late, and no device renders the force."
                 .to_owned()
         }
         (_, true) => "Started with --no-rt. Restart without it for real-time forces.".to_owned(),

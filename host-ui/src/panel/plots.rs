@@ -16,6 +16,8 @@ use stylet_implant::score::Trace;
 
 /// Height of the parts under the plots over time, and of the title over each.
 const UNDER_PLOTS: f32 = 432.0;
+/// The same for a core that this window steps: it has no latency, and no times of ticks.
+const UNDER_STEPPED: f32 = 150.0;
 const TITLE: f32 = 20.0;
 const PLOT_HEIGHTS: [f32; 2] = [48.0, 190.0];
 /// Height of a line on unseen ticks.
@@ -45,9 +47,12 @@ pub fn plots_ui(
     } else {
         0.0
     };
-    let plots = Quantity::ALL.len() as f32;
+    let (plots, under) = match shown.is_stepped() {
+        true => (Quantity::ALL.len() as f32 - 1.0, UNDER_STEPPED),
+        false => (Quantity::ALL.len() as f32, UNDER_PLOTS),
+    };
     let legend = if marked.is_empty() { 0.0 } else { MARKS_LINE };
-    let free = height - UNDER_PLOTS - plots * TITLE - second - legend - lines as f32 * SEEN_LINE;
+    let free = height - under - plots * TITLE - second - legend - lines as f32 * SEEN_LINE;
     let each = (free / plots).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
     let recent = |ui: &mut egui::Ui, name, color, unit, least, quantity| {
         Strip {
@@ -84,6 +89,9 @@ pub fn plots_ui(
                 Quantity::DepthMm,
             );
         }
+    }
+    if shown.is_stepped() {
+        return setup::setup_ui(ui, shown);
     }
     let worst = now(shown
         .state

@@ -10,6 +10,12 @@ use stylet_base::format::printable;
 use stylet_shm_schema::{Fault, Request};
 
 const LOAD: &str = "Load the scene";
+/// What is kept before an implant is removed.
+const SAVED: &str = if crate::IN_PAGE {
+    "The debrief is downloaded"
+} else {
+    "Plan and debrief are saved under out/"
+};
 
 /// Starting point of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,9 +108,7 @@ pub fn question_ui(ctx: &egui::Context, shown: &Shown, question: Option<&Questio
                 ),
                 Some(what) => {
                     let undone = undone(action, shown);
-                    let text = format!(
-                        "This removes {what} from the tissue. {undone} Plan and debrief are saved under out/ first."
-                    );
+                    let text = format!("This removes {what} from the tissue. {undone} {SAVED} first.");
                     (text, "Keep the implant (N)")
                 }
             };

@@ -1,5 +1,6 @@
 //! The bar at the top: link, figures, force and settings.
 
+use crate::IN_PAGE;
 use crate::action::Action;
 use crate::panel::banners::not_real_time_words;
 use crate::settings::{SCALES, STRENGTHS_U, Settings, ThemeChoice};
@@ -130,7 +131,9 @@ fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
     if shown.is_absent() {
         return;
     }
-    if shown.state.is_some() {
+    // A recorded core may have had real time; the page around it has none.
+    let is_played_in_page = IN_PAGE && shown.watched.is_some();
+    if shown.state.is_some() && !is_played_in_page {
         if shown.is_real_time() {
             badge(ui, "REAL-TIME", tokens.good);
         } else {

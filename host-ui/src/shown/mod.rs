@@ -165,6 +165,12 @@ impl Shown {
         matches!(self.status, LinkStatus::Absent { .. })
     }
 
+    /// Returns whether this window steps its core, which then has no loops whose timing could be measured.
+    pub fn is_stepped(&self) -> bool {
+        // A recording does not keep the process of its core.
+        self.watched.is_none() && self.session.is_some_and(|session| session.pid == 0)
+    }
+
     /// Returns whether the newest tick has a bit of [`flags`].
     pub fn has_flag(&self, flag: u32) -> bool {
         self.state.is_some_and(|s| s.flags & flag != 0)

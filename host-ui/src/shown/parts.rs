@@ -47,8 +47,6 @@ pub struct FrameCost {
 /// Recording that replaces a core.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Watched {
-    /// True if there is a core to go back to.
-    pub can_close: bool,
     pub name: String,
     pub at_s: f64,
     pub length_s: f64,

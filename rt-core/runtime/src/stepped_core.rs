@@ -16,7 +16,8 @@ use std::rc::Rc;
 use std::sync::atomic::Ordering;
 use stylet_hw::{Device, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_shm_schema::{
-    HapticState, ParameterProblems, ParameterSet, SCHEMA_VERSION, Session, Text, ThreadReport, flags,
+    Command, CommandKind, HapticState, ParameterProblems, ParameterSet, SCHEMA_VERSION, Session, Text, ThreadReport,
+    flags,
 };
 use stylet_sim::active::activate;
 use stylet_sim::scene::{Scene, SceneError, SceneSource};
@@ -55,6 +56,8 @@ pub struct SteppedCore {
     now_ns: u64,
     ticks: u64,
     lost_ns: u64,
+    /// Renewal that stands until the end of this step: a host that steps its core is there meanwhile.
+    renewal: Option<Command>,
 }
 
 impl SteppedCore {
@@ -107,11 +110,17 @@ impl SteppedCore {
             now_ns,
             ticks: 0,
             lost_ns: 0,
+            renewal: None,
         })
     }
 
     /// Takes a request; its answer follows after a later step.
     pub fn ask(&mut self, asked: Asked) {
+        if let Asked::Command(command) = &asked
+            && command.kind == CommandKind::KeepMoving as u32
+        {
+            self.renewal = Some(**command);
+        }
         self.desk.asked.borrow_mut().push_back(asked);
     }
 
@@ -122,6 +131,7 @@ impl SteppedCore {
         for _ in 0..behind_ns.min(MOST_BEHIND_NS) / HAPTIC_PERIOD_NS {
             self.tick();
         }
+        self.renewal = None;
     }
 
     fn tick(&mut self) {
@@ -133,6 +143,8 @@ impl SteppedCore {
         }
         if self.ticks.is_multiple_of(TICKS_PER_PASS) {
             self.desk.now_ns.set(self.now_ns);
+            let renewal = self.renewal.map(Box::new).map(Asked::Command);
+            self.desk.asked.borrow_mut().extend(renewal);
             // A request to end has no process to end, and no pass is without a tick.
             let _ = self.control.pass();
         }

@@ -84,8 +84,8 @@ fn the_page_of_commands_says_what_the_programs_say() {
 #[test]
 fn every_command_of_a_product_is_typed_with_the_simulators_program() {
     let started = [
-        ("rt-core", ["stylet-lab", "stylet-study"]),
-        ("host-ui", ["stylet-clinic", "stylet-igtl"]),
+        ("rt-core", &["stylet-lab", "stylet-study"][..]),
+        ("host-ui", &["stylet-clinic", "stylet-igtl", "stylet-demo"]),
     ];
     let mut checked = 0;
     for (simulator, products) in started {

@@ -10,13 +10,14 @@ mod help;
 mod pages;
 
 #[cfg(test)]
-const PROGRAMS: [&str; 6] = [
+const PROGRAMS: [&str; 7] = [
     "rt-core",
     "stylet-lab",
     "stylet-study",
     "host-ui",
     "stylet-clinic",
     "stylet-igtl",
+    "stylet-demo",
 ];
 /// Packages, by the folder of their manifest.
 #[cfg(test)]

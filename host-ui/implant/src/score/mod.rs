@@ -21,7 +21,7 @@ use stylet_host::moments::Moment;
 use stylet_report::picture::DrawError;
 use stylet_shm_schema::{SeedPose, TickRecord, touching};
 pub use trace::Trace;
-pub use write::{to_json, write};
+pub use write::{files, to_json, write};
 
 const POINTS: usize = 100_000;
 

@@ -46,12 +46,18 @@ pub fn to_json(score: &Score) -> Value {
     })
 }
 
-/// Writes `score.json` and `debrief.html` into an existing folder; `made` is their provenance.
-pub fn write(score: &Score, made: Value, folder: &Path) -> Result<(), ScoreError> {
+/// Returns the debrief as files, each with its name; `made` is their provenance.
+pub fn files(score: &Score, made: Value) -> Result<[(&'static str, String); 2], ScoreError> {
     let mut value = to_json(score);
     value["made"] = made;
     let json = serde_json::to_string_pretty(&value)? + "\n";
-    write_whole(&folder.join("score.json"), json.as_bytes())?;
-    write_whole(&folder.join("debrief.html"), page::page(score)?.as_bytes())?;
+    Ok([("score.json", json), ("debrief.html", page::page(score)?)])
+}
+
+/// Writes the debrief's files into an existing folder.
+pub fn write(score: &Score, made: Value, folder: &Path) -> Result<(), ScoreError> {
+    for (name, text) in files(score, made)? {
+        write_whole(&folder.join(name), text.as_bytes())?;
+    }
     Ok(())
 }

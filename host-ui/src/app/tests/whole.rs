@@ -235,7 +235,6 @@ fn recorded(app: &mut App, shown: Shown, has_ended: bool) {
     app.shown = shown;
     app.shown.running = true;
     app.shown.watched = Some(Watched {
-        can_close: true,
         name: LONG_PATH.to_owned(),
         at_s: 123.4,
         length_s: 1234.5,

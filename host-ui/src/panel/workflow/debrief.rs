@@ -11,10 +11,17 @@ use egui_plot::{Line, PlotPoints, VLine};
 use stylet_base::format;
 use stylet_shm_schema::touching;
 
+/// Place of the debrief's files.
+const AS: &str = if crate::IN_PAGE {
+    "as downloads"
+} else {
+    "in a new folder under out/"
+};
+
 pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     let save = ui.add_enabled(!shown.seeds.is_empty(), egui::Button::new("Save the debrief"));
     if save
-        .on_hover_text("A page and its figures: debrief.html and score.json, in a new folder under out/")
+        .on_hover_text(format!("A page and its figures: debrief.html and score.json, {AS}"))
         .clicked()
     {
         actions.push(Action::SaveDebrief);

@@ -167,6 +167,27 @@ fn way(run: &NeedleRehearsal) -> NeedleWay {
     }
 }
 
+/// A slow host makes 100 ms of ticks after one renewal, and a fast motion may go on for 37 ms without another.
+#[test]
+fn a_motion_goes_on_within_a_long_step() {
+    let tip_m = |step_ms: u64| {
+        let mut host = Host::new(TissueKind::ChainMail);
+        let [x, y, z] = host.core.state().tip_in_scene_m;
+        host.ask(&Request::MoveHand(HandMove {
+            tip_m: [x, y, z - 0.05],
+            direction: [0.0, 0.0, 1.0],
+            speed_m_per_s: 0.1,
+            acceleration_m_per_s2: 2.0,
+        }));
+        for _ in 0..400 / step_ms {
+            host.ask(&Request::KeepMoving { valid_s: 0.3 });
+            host.step(step_ms * MS);
+        }
+        host.core.state().tip_in_scene_m
+    };
+    assert_eq!(tip_m(100), tip_m(2));
+}
+
 /// The requests of a host give what a rehearsal of the same needle with the same hand gives: the seeds to 0.1 mm, and
 /// the largest force to 1 %.
 #[test]

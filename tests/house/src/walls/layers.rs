@@ -369,6 +369,19 @@ pub const LAYERS: &[Layer] = &[
         never: &[],
         not_itself: &[PORTS],
     },
+    Layer {
+        folder: "rt-core/demo",
+        // The only crate that knows both sides: a window over a core of its own process.
+        may_use: &[
+            "host-ui",
+            "host-ui/host",
+            "rt-core/runtime",
+            "rt-core/sim",
+            "shm-schema",
+        ],
+        never: &[],
+        not_itself: &[PORTS, WINDOW, DICOM],
+    },
     // For scripts of either side, without a process of its own.
     Layer {
         folder: "rt-core/python",
