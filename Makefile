@@ -181,7 +181,7 @@ web: ## Build the window and a core for a browser, into target/web-site (some mi
 web-test: web products ## Implant five seeds in headless Chromium, in three sizes, and compare with host-ui procedure
 	@docs/tools/need chromium python3-venv
 	python3 -m venv $(SITE)-test && $(SITE)-test/bin/pip install -q playwright==1.63.0
-	$(SITE)-test/bin/python host-ui/web/check.py $(SITE) host-ui/example/insertion.mcap $(SITE)-test/pictures
+	$(SITE)-test/bin/python host-ui/web/check.py $(SITE) $(abspath $(BIN)) host-ui/example/insertion.mcap $(SITE)-test/pictures
 
 attributes: ## Read 10,000 objects of each kind with damaged attributes; a wrong figure without a note fails
 	STYLET_ATTRIBUTES=$(or $(OBJECTS),10000) $(CARGO) test --profile quick -p stylet-files --lib damaged_attributes -- --nocapture

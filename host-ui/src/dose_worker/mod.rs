@@ -225,8 +225,10 @@ impl DoseWorker {
         self.computing = Some(Job::begin("dose", move |result, _| {
             // A dose that failed left the kernel and the volumes as they were.
             let kept = &mut *kept.lock().unwrap_or_else(PoisonError::into_inner);
-            // The window may have closed; the dose is then dropped.
-            let _ = kept.dose(&task).map(|dose| result.send(dose));
+            if let Some(dose) = kept.dose(&task) {
+                // The window may have closed; the dose is then dropped.
+                let _ = result.send(dose);
+            }
         }));
         self.requested = Some((key, request.clone()));
     }

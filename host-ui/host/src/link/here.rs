@@ -73,7 +73,9 @@ impl<C: LocalCore> Here<C> {
     /// a frame at once, and the core does not outlive its host.
     fn renew(&mut self, now: Instant) {
         let valid_s = VALID_RANGE_S[1];
-        let holds = |until: Instant| now < until + Duration::from_secs_f64(valid_s);
+        // A page runs the core only while it draws, and may draw once a second.
+        let late_s = if cfg!(target_family = "wasm") { 5.0 } else { valid_s };
+        let holds = |until: Instant| now < until + Duration::from_secs_f64(late_s);
         if !self.promised_until.is_some_and(holds) {
             return;
         }

@@ -177,6 +177,9 @@ fn dialogs_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
 }
 
 fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bool, actions: &mut Vec<Action>) {
+    if crate::IN_PAGE {
+        return;
+    }
     ui.horizontal(|ui| {
         let width = ui.available_width() - BESIDE_FIELD;
         let field = path_ui(ui, "plan file", &mut state.plan.path, "plan file", width);
