@@ -14,6 +14,8 @@ mod command;
 pub mod cpu_time;
 mod dialog;
 mod dose_worker;
+#[cfg(target_family = "wasm")]
+mod download;
 #[cfg(not(target_family = "wasm"))]
 pub mod heap;
 pub mod keyboard;

@@ -4,7 +4,7 @@
 
 use crate::app::{App, Home, Options};
 use wasm_bindgen::{JsCast, JsValue};
-use web_sys::{Blob, Document, HtmlAnchorElement, HtmlCanvasElement, Url};
+use web_sys::{Document, HtmlCanvasElement};
 
 /// Identifiers of the elements of `web/index.html`.
 const CANVAS: &str = "window";
@@ -38,16 +38,4 @@ async fn open(document: &Document, home: Home) -> Result<(), JsValue> {
         Box::new(move |cc| Ok(Box::new(App::with_home(cc, Options::default(), home))));
     let options = eframe::WebOptions::default();
     eframe::WebRunner::new().start(canvas, options, create).await
-}
-
-/// Hands a file to the reader, as a download.
-pub fn download(name: &str, content: &[u8]) -> Result<(), JsValue> {
-    let parts = js_sys::Array::of1(&js_sys::Uint8Array::from(content));
-    let address = Url::create_object_url_with_blob(&Blob::new_with_u8_array_sequence(&parts)?)?;
-    let document = web_sys::window().and_then(|window| window.document());
-    let link: HtmlAnchorElement = document.ok_or("no page")?.create_element("a")?.unchecked_into();
-    link.set_href(&address);
-    link.set_download(name);
-    link.click();
-    Url::revoke_object_url(&address)
 }

@@ -293,7 +293,7 @@ fn save(score: &Score, made: serde_json::Value, folder: &Path) -> Saved {
 fn save(score: &Score, made: serde_json::Value, _: &Path) -> Saved {
     let files = score::files(score, made)?;
     for (name, text) in &files {
-        crate::web::download(name, text.as_bytes()).map_err(|why| format!("no download of {name}: {why:?}"))?;
+        crate::download::offer(name, text.as_bytes()).map_err(|why| format!("no download of {name}: {why:?}"))?;
     }
     Ok(files.map(|(name, _)| name).join(" and "))
 }

@@ -185,8 +185,7 @@ impl Shown {
         self.has_flag(flags::WAITING)
     }
 
-    /// Returns the displacement of the tissue at the tip at which its linear answer folded, m;
-    /// `None` if it has not since the needle went in.
+    /// Returns the displacement of the tissue at the tip at which its linear answer folded, m; `None` if it has not.
     pub fn folded_from_m(&self) -> Option<f64> {
         self.state.map(|s| s.folded_from_m).filter(|m| *m > 0.0)
     }
@@ -204,8 +203,7 @@ impl Shown {
         self.has_flag(flags::PUNCTURED)
     }
 
-    /// Returns the fault; `None` for a number that this program does not know, which is a fault
-    /// too.
+    /// Returns the fault; `None` for a number that this program does not know, which is a fault too.
     pub fn fault(&self) -> Option<Fault> {
         Fault::from_number(self.state.map_or(0, |s| s.fault))
     }

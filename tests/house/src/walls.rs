@@ -3,6 +3,7 @@
 mod circles;
 mod crates;
 mod imports;
+mod layer;
 mod layers;
 mod shape;
 mod syntax;

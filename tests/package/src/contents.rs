@@ -112,7 +112,7 @@ fn the_desktop_starts_what_is_installed_and_finds_its_icon() {
     let icon = format!("/usr/share/icons/hicolor/scalable/apps/{}.svg", keys["Icon"]);
     assert!(text(&files[&icon]).contains("<svg "), "{icon}");
     // The desktop identifies the program's window by this name.
-    let window = text(&repository("host-ui/src/app/mod.rs"));
+    let window = text(&repository("host-ui/src/app/open.rs"));
     assert!(window.contains(&format!("with_app_id(\"{}\")", keys["StartupWMClass"])));
 }
 

@@ -1,36 +1,6 @@
 //! The table of layers: a row for each crate.
 
-const WINDOW: &[&str] = &[
-    "egui",
-    "eframe",
-    "egui_plot",
-    "egui-wgpu",
-    "egui_kittest",
-    "wgpu",
-    "winit",
-];
-/// Crates that compute pictures without a window use `wgpu`.
-const TOOLKIT: &[&str] = &["egui", "eframe", "egui-wgpu", "winit"];
-/// Only `shm-schema/ports` makes ports (ADR 19).
-const PORTS: &[&str] = &["iceoryx2"];
-const ARGUMENTS: &[&str] = &["clap"];
-const PROGRAM: &[&str] = &["indicatif", "signal-hook"];
-const DEVICES: &[&str] = &["evdev", "libloading"];
-const DICOM: &[&str] = &["dicom-core", "dicom-dictionary-std", "dicom-object", "nifti"];
-
-/// Absent from the libraries that build for `wasm32-unknown-unknown`: simulation and dose.
-const SYSTEM: &[&str] = &["libc", "memmap2", "rustix", "tungstenite"];
-
-/// Dependencies allowed to one crate.
-pub struct Layer {
-    pub folder: &'static str,
-    /// Folders of our crates that its manifest may name.
-    pub may_use: &'static [&'static str],
-    /// External crates that neither it nor its dependencies may name.
-    pub never: &'static [&'static [&'static str]],
-    /// External crates that it may not name itself.
-    pub not_itself: &'static [&'static [&'static str]],
-}
+use super::layer::{ARGUMENTS, DEVICES, DICOM, Layer, PORTS, PROGRAM, SYSTEM, TOOLKIT, WINDOW};
 
 /// From the bottom up: a crate uses those above it in this table. A new crate needs a row; a row may precede its crate.
 pub const LAYERS: &[Layer] = &[
@@ -374,10 +344,13 @@ pub const LAYERS: &[Layer] = &[
         // The only crate that knows both sides: a window over a core of its own process.
         may_use: &[
             "host-ui",
+            "host-ui/base",
             "host-ui/host",
+            "host-ui/implant",
             "rt-core/runtime",
             "rt-core/sim",
             "shm-schema",
+            "shm-schema/manual",
         ],
         never: &[],
         not_itself: &[PORTS, WINDOW, DICOM],
