@@ -1,4 +1,4 @@
-"""Module of 3D Slicer: shows needle, seeds and gland of a running simulator with one click (docs/slicer.md)."""
+"""Module of 3D Slicer: shows needle, seeds, gland and ultrasound of a running simulator with one click (docs/slicer.md)."""
 
 import qt
 import slicer
@@ -16,7 +16,7 @@ class Stylet(ScriptedLoadableModule):
         parent.title = "Stylet"
         parent.categories = ["IGT"]
         parent.contributors = ["Stylet"]
-        parent.helpText = "Shows a simulated brachytherapy: needle, seeds and gland. Not a medical device."
+        parent.helpText = "Shows a simulated brachytherapy: needle, seeds, gland and ultrasound. Not a medical device."
 
 
 class StyletWidget(ScriptedLoadableModuleWidget):

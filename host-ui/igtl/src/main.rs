@@ -18,7 +18,7 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Task {
-    /// Serve needle, seeds, gland and state to 3D Slicer over OpenIGTLink, until interrupted;
+    /// Serve needle, seeds, gland, state and ultrasound to 3D Slicer over OpenIGTLink, until interrupted;
     /// anyone who reaches the address can watch, because the protocol has no passwords
     Igtl(serve::Options),
     /// Write the man pages and shell completions of this program

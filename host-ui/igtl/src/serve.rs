@@ -1,9 +1,10 @@
-//! Serves the state of the core: needle, seeds, surface of the gland and a text, in RAS and mm.
-//! Moves the simulated hands for clients with permission.
+//! Serves the state of the core: needle, seeds, surface of the gland, a text and the probe's picture,
+//! in RAS and mm. Moves the simulated hands for clients with permission.
 
-use crate::codec::{Body, CodecError, Message, Point, PolyData, Timestamp};
+use crate::codec::{Body, CodecError, Point, PolyData, Timestamp};
 use crate::frame::{needle, place_mm};
 use crate::hand::HandOptions;
+use crate::image::{Beyond, ImageOptions, Pictures};
 use crate::requests::Requests;
 use crate::server::{Server, ServerError};
 use clap::Args;
@@ -16,6 +17,8 @@ use stylet_anatomy::PatientFrame;
 use stylet_base::interrupt::{Interrupt, InterruptError};
 use stylet_base::lines::Lines;
 use stylet_host::link::{Link, LinkStatus, SceneModel, Snapshot};
+use stylet_imaging::NoGpu;
+use stylet_imaging::ultrasound::NoPicture;
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::{HapticState, Phase, StructureInfo, role};
 
@@ -49,6 +52,9 @@ pub struct Options {
     /// Maximum speed of both hands, 0.1 to 1000 mm/s
     #[arg(long, default_value_t = 100.0, value_name = "MM/S")]
     pub hand_speed: f64,
+    /// Picture of the probe
+    #[command(flatten)]
+    pub image: ImageOptions,
 }
 
 /// Error that ended the service.
@@ -60,6 +66,12 @@ pub enum ServeError {
     /// A speed beyond its limits.
     #[error("--hand-speed {0}: 0.1 to 1000 mm/s are possible")]
     Speed(f64),
+    /// A value of the picture beyond its limits.
+    #[error(transparent)]
+    Image(#[from] Beyond),
+    /// Pictures were asked for, and nothing computes them.
+    #[error("--image: {0}")]
+    NoGpu(#[from] NoGpu),
     /// The server could not start.
     #[error(transparent)]
     Server(#[from] ServerError),
@@ -79,6 +91,8 @@ pub fn run(options: &Options) -> Result<(), ServeError> {
     if !(0.1..=1000.0).contains(&options.hand_speed) {
         return Err(ServeError::Speed(options.hand_speed));
     }
+    options.image.check()?;
+    let mut pictures = Pictures::begin(&options.image)?;
     let interrupted = Interrupt::on_signals()?;
     // A terminal that is stopped or closed must not block the loop that watches for silent clients.
     let lines = Arc::new(Lines::to_stdout());
@@ -102,6 +116,9 @@ pub fn run(options: &Options) -> Result<(), ServeError> {
         link.poll();
         link.take_records();
         requests.pass(&mut link, &server);
+        if let Some(pictures) = &mut pictures {
+            pictures.pass(&link, &server, &lines)?;
+        }
         let now = Instant::now();
         if now < next {
             std::thread::sleep((next - now).min(PASS));
@@ -112,29 +129,23 @@ pub fn run(options: &Options) -> Result<(), ServeError> {
         if is_slow {
             slow = Some(Instant::now());
         }
-        for (device, body) in devices(&link, is_slow) {
-            publish(&server, device, body)?;
+        for (device, body) in devices(&link, is_slow, pictures.as_ref().and_then(|p| p.trouble)) {
+            server.send(device, Timestamp::now(), body)?;
         }
     }
     requests.end(&mut link);
     Ok(())
 }
 
-fn publish(server: &Server, device: &str, body: Body) -> Result<(), CodecError> {
-    let message = Message {
-        device: device.to_owned(),
-        time: Timestamp::now(),
-        body,
-    };
-    server.publish(device, message.encode()?);
-    Ok(())
-}
-
-fn devices(link: &Link, is_slow: bool) -> Vec<(&'static str, Body)> {
+fn devices(link: &Link, is_slow: bool, trouble: Option<NoPicture>) -> Vec<(&'static str, Body)> {
     let mut devices = Vec::new();
     let scene = link.scene();
     if is_slow {
-        devices.push(("State", Body::Text(words(&link.status(), link.state()))));
+        let mut words = words(&link.status(), link.state());
+        if let Some(why) = trouble.filter(|_| matches!(link.status(), LinkStatus::Live)) {
+            words += &format!("; no ultrasound: {why}");
+        }
+        devices.push(("State", Body::Text(words)));
     }
     let (Some(scene), LinkStatus::Live) = (scene, link.status()) else {
         return devices;

@@ -9,7 +9,7 @@ mod admission;
 mod incoming;
 mod outgoing;
 
-use crate::codec::Status;
+use crate::codec::{Body, CodecError, Message, Status, Timestamp};
 use admission::{Admission, Limits};
 use outgoing::Client;
 use std::collections::BTreeMap;
@@ -112,6 +112,17 @@ impl Server {
         self.address
     }
 
+    /// Queues a message of a device as [`Self::publish`] does.
+    pub fn send(&self, device: &str, time: Timestamp, body: Body) -> Result<(), CodecError> {
+        let message = Message {
+            device: device.to_owned(),
+            time,
+            body,
+        };
+        self.publish(device, message.encode()?);
+        Ok(())
+    }
+
     /// Queues a message for every client, replacing an older one of this device. Never waits for a
     /// client.
     pub fn publish(&self, device: &str, bytes: Vec<u8>) {
@@ -121,6 +132,11 @@ impl Server {
         for client in &shared.clients {
             client.put(device, bytes.clone());
         }
+    }
+
+    /// Returns whether anyone is connected.
+    pub fn has_clients(&self) -> bool {
+        !lock(&self.shared).clients.is_empty()
     }
 
     /// Returns the newest transform of each device of each client since the last call.

@@ -2,6 +2,7 @@
 
     client.py extended FILE             writes the transform of goldens.cpp with header version 2, as protocol 3 sends it
     client.py read FOLDER               prints what it reads of the messages in goldens/, as JSON
+    client.py picture HOST PORT FILE            writes the greys of the next ultrasound; prints frame, size and matrix
     client.py watch HOST PORT SECONDS   watches a server and moves its hand, 60 times a second; prints what it saw, as JSON
 """
 
@@ -43,6 +44,8 @@ def said(message):
         return message.matrix.tolist()
     if kind == "POINT":
         return [np.asarray(message.positions).tolist(), list(message.names)]
+    if kind == "IMAGE":
+        return [message.world_coordinate_system, message.ijk_to_world_matrix.tolist(), message.image.tolist()]
     if kind == "POLYDATA":
         return [message.points.tolist(), message.polygons.tolist()]
     return message.string
@@ -63,6 +66,15 @@ def read(folder):
         message.unpack(header, body)
         seen[path.stem] = {"device": message.device_name, "time": message.timestamp, "says": said(message)}
     print(json.dumps(seen))
+
+
+def picture(host, port, path):
+    client = pyigtl.OpenIGTLinkClient(host, port)
+    message = client.wait_for_message("Ultrasound", timeout=20)
+    pathlib.Path(path).write_bytes(message.image.tobytes())
+    matrix = message.ijk_to_world_matrix.tolist()
+    print(json.dumps({"frame": message.world_coordinate_system, "size": message.image.shape, "ras_from_ijk": matrix}))
+    client.stop()
 
 
 def watch(host, port, seconds):
@@ -94,5 +106,7 @@ if __name__ == "__main__":
         extended(*rest)
     elif task == "read":
         read(*rest)
+    elif task == "picture":
+        picture(rest[0], int(rest[1]), rest[2])
     else:
         watch(rest[0], int(rest[1]), float(rest[2]))

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <vector>
+#include <igtlImageMessage.h>
 #include <igtlMessageHeader.h>
 #include <igtlPointMessage.h>
 #include <igtlPolyDataMessage.h>
@@ -84,6 +85,24 @@ static void polydata(igtl::MessageHeader* header, const std::vector<unsigned cha
     write(header, out);
 }
 
+static void image(igtl::MessageHeader* header, const std::vector<unsigned char>& body) {
+    igtl::ImageMessage::Pointer in = read<igtl::ImageMessage>(header, body), out = igtl::ImageMessage::New();
+    int size[3];
+    float spacing_mm[3];
+    igtl::Matrix4x4 m;
+    in->GetDimensions(size);
+    in->GetSpacing(spacing_mm);
+    in->GetMatrix(m);
+    out->SetDimensions(size);
+    out->SetSpacing(spacing_mm);
+    out->SetScalarType(in->GetScalarType());
+    out->SetCoordinateSystem(in->GetCoordinateSystem());
+    out->SetMatrix(m);
+    out->AllocateScalars();
+    memcpy(out->GetScalarPointer(), in->GetScalarPointer(), in->GetImageSize());
+    write(header, out);
+}
+
 static void status(igtl::MessageHeader* header, const std::vector<unsigned char>& body) {
     igtl::StatusMessage::Pointer in = read<igtl::StatusMessage>(header, body), out = igtl::StatusMessage::New();
     out->SetCode(in->GetCode());
@@ -112,6 +131,7 @@ int main() {
         if (type == "TRANSFORM") transform(header, body);
         else if (type == "POINT") points(header, body);
         else if (type == "POLYDATA") polydata(header, body);
+        else if (type == "IMAGE") image(header, body);
         else if (type == "STATUS") status(header, body);
         else if (type == "STRING") text(header, body);
         else fail(type.c_str());

@@ -1,7 +1,9 @@
 // Writes the example messages with libOpenIGTLink into the folder given: the bytes that the codec must produce.
 // Build: g++ -I/usr/include/openigtlink goldens.cpp -lOpenIGTLink -lpthread
 #include <cstdio>
+#include <cstring>
 #include <string>
+#include <igtlImageMessage.h>
 #include <igtlPointMessage.h>
 #include <igtlPolyDataMessage.h>
 #include <igtlStatusMessage.h>
@@ -54,6 +56,19 @@ int main(int, char** argv) {
     surface->SetPoints(places);
     surface->SetPolygons(cells);
     write(surface, folder, "polydata");
+
+    igtl::ImageMessage::Pointer image = igtl::ImageMessage::New();
+    // Spacing and unit vectors; the origin is the centre of all pixels.
+    igtl::Matrix4x4 axes = {{1, 0, 0, 1.5f}, {0, 0, 1, -2.25f}, {0, -1, 0, 30.125f}, {0, 0, 0, 1}};
+    const unsigned char greys[] = {0, 1, 127, 128, 254, 255};
+    image->SetDimensions(3, 2, 1);
+    image->SetSpacing(0.25f, 0.5f, 2.0f);
+    image->SetScalarTypeToUint8();
+    image->SetCoordinateSystem(igtl::ImageMessage::COORDINATE_RAS);
+    image->SetMatrix(axes);
+    image->AllocateScalars();
+    memcpy(image->GetScalarPointer(), greys, sizeof greys);
+    write(image, folder, "image");
 
     igtl::StatusMessage::Pointer status = igtl::StatusMessage::New();
     status->SetCode(igtl::StatusMessage::STATUS_OK);

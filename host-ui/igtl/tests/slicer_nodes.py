@@ -1,6 +1,7 @@
 """The module for 3D Slicer with Slicer's own nodes: Python with slicer-core (`make igtl-test`).
 
     slicer_nodes.py watch HOST PORT SECONDS   shows a server in a scene, which is closed once; prints its nodes, as JSON
+    slicer_nodes.py picture HOST PORT FILE    shows the probe's picture; prints its node, and its largest difference from FILE.png
     slicer_nodes.py strangers                 connects to servers that are absent, full, slow or not Stylet's
 """
 
@@ -51,6 +52,35 @@ def watch(host, port, seconds):
     print(json.dumps(seen))
 
 
+def picture(host, port, file):
+    import numpy as np
+    import slicer
+    import vtk
+    from StyletLib.nodes import Nodes
+    from vtk.util.numpy_support import vtk_to_numpy
+
+    scene = slicer.vtkMRMLScene()
+    link, nodes = Link(host, port), Nodes(scene)
+    end, volume = time.monotonic() + 20, None
+    while volume is None and time.monotonic() < end:
+        nodes.show(link.poll())
+        volume = scene.GetFirstNode("Stylet ultrasound", "vtkMRMLScalarVolumeNode")
+        time.sleep(0.01)
+    reader = vtk.vtkPNGReader()
+    reader.SetFileName(file)
+    reader.Update()
+    size = reader.GetOutput().GetDimensions()
+    # VTK counts the rows of a file from below.
+    written = vtk_to_numpy(reader.GetOutput().GetPointData().GetScalars()).reshape(size[1], size[0], -1)[::-1, :, 0]
+    shown = vtk_to_numpy(volume.GetImageData().GetPointData().GetScalars()).reshape(size[1], size[0])
+    matrix = vtk.vtkMatrix4x4()
+    volume.GetIJKToRASMatrix(matrix)
+    off = int(np.abs(shown.astype(int) - written).max())
+    rows = [[matrix.GetElement(row, column) for column in range(4)] for row in range(4)]
+    print(json.dumps({"off": off, "size": size, "greys": len(np.unique(shown)), "ras_from_ijk": rows}))
+    link.close()
+
+
 def message(kind, device, body, size=None):
     head = HEADER.pack(1, kind.encode(), device.encode(), len(body) if size is None else size)
     return head + body
@@ -92,6 +122,7 @@ def strangers():
         ("STRING", "State", b"", MOST_BYTES + 1),
         ("TRANSFORM", "Needle", b"short", None),
         ("POLYDATA", "Gland", beyond, None),
+        ("IMAGE", "Ultrasound", struct.pack(">H4B3H", 1, 1, 3, 1, 1, 4, 4, 1) + bytes(60 + 15), None),
     ):
         link, words, received = after([message(kind, device, body, size)])
         assert received == {} and words.endswith("is not Stylet's."), words
@@ -106,6 +137,8 @@ if __name__ == "__main__":
     task, *rest = sys.argv[1:]
     if task == "watch":
         watch(rest[0], int(rest[1]), float(rest[2]))
+    elif task == "picture":
+        picture(rest[0], int(rest[1]), rest[2])
     else:
         strangers()
         print("{}")

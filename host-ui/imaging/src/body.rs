@@ -1,12 +1,14 @@
 //! The imaged object: labels of the body at rest, the tissue of each, and the metal in it.
 
-use crate::Tissue;
+use crate::{Bend, Tissue};
 use nalgebra::Vector3;
-use stylet_shm_schema::{GridInfo, SceneHeader};
+use stylet_shm_schema::{GridInfo, HapticState, LeftNeedlePose, SceneHeader, SeedPose, SnapshotHeader};
 pub use stylet_shm_schema::{SEED_LENGTH_M, SEED_RADIUS_M};
 
 /// Radius of a needle, 18 G, m.
 pub const NEEDLE_RADIUS_M: f64 = 0.635e-3;
+/// Drawn length of a needle, m.
+const NEEDLE_M: f64 = 0.15;
 
 /// Body at rest.
 #[derive(Clone, Debug)]
@@ -69,4 +71,41 @@ pub struct Metal {
     pub seeds: Vec<Seed>,
     /// All needles.
     pub needles: Vec<Needle>,
+}
+
+impl Metal {
+    /// Returns the seeds, which an exercise moves with the body, the needles that stay in, and the
+    /// moving one after its first tick.
+    pub fn of(
+        seeds: &[SeedPose],
+        body_moved_m: [f64; 3],
+        left: &[LeftNeedlePose],
+        bend: &Bend,
+        state: Option<&HapticState>,
+    ) -> Self {
+        let seeds = seeds.iter().map(|seed| Seed {
+            middle_m: Vector3::from(seed.position_m) + Vector3::from(body_moved_m),
+            axis: seed.axis.into(),
+        });
+        let left = left.iter().map(|left| {
+            let tip = Vector3::from(left.tip_m);
+            vec![tip, tip - Vector3::from(left.direction) * NEEDLE_M]
+        });
+        let moving = state.filter(|s| s.tick > 0).map(|s| {
+            let points_m = bend.points_m(s.tip_in_scene_m, s.needle_direction, NEEDLE_M);
+            points_m.into_iter().map(Vector3::from).collect()
+        });
+        Self {
+            seeds: seeds.collect(),
+            needles: left.chain(moving).map(|points_m| Needle { points_m }).collect(),
+        }
+    }
+
+    /// Returns the metal of a snapshot, with the needle of the newest state.
+    pub fn of_snapshot(header: &SnapshotHeader, state: Option<&HapticState>) -> Self {
+        let mut bend = Bend::default();
+        bend.take(header);
+        let seeds = header.seeds.get(..header.seed_count as usize).unwrap_or(&[]);
+        Self::of(seeds, header.body_moved_m, header.left(), &bend, state)
+    }
 }

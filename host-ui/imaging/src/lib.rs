@@ -6,6 +6,7 @@
 //! limits.
 #![warn(missing_docs)]
 
+mod bend;
 mod body;
 pub mod fluoroscopy;
 pub mod gpu;
@@ -13,6 +14,7 @@ mod tissue;
 pub mod ultrasound;
 pub mod xray;
 
+pub use bend::Bend;
 pub use body::{Body, Metal, NEEDLE_RADIUS_M, Needle, SEED_LENGTH_M, SEED_RADIUS_M, Seed};
 pub use gpu::{Gpu, NoGpu};
 pub use tissue::{OUTSIDE, Tissue, brightness};

@@ -3,16 +3,15 @@
 
 use super::CommandError;
 use crate::picture::png_of;
-use crate::shown::Shown;
 use clap::{Args, ValueEnum};
 use nalgebra::{Vector2, Vector3};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use stylet_base::write_whole;
 use stylet_host::core_args::CoreArgs;
-use stylet_host::link::SceneModel;
+use stylet_host::link::{Link, SceneModel};
 use stylet_imaging::fluoroscopy::{Attenuation, CArm, Exposure, Fluoroscope};
-use stylet_imaging::ultrasound::{Plane, Pose, Probe, Scanner, Settings, View};
+use stylet_imaging::ultrasound::{NoPicture, Plane, Pose, Probe, Scanner, Settings, View};
 use stylet_imaging::{Body, Gpu, Metal};
 use stylet_implant::plan::{Hole, Template};
 use stylet_implant::procedure::Live;
@@ -22,10 +21,11 @@ use stylet_surfaces::field::Field;
 const SNAPSHOT_WITHIN: Duration = Duration::from_secs(3);
 
 const HELP: &str = "\
-The picture shows the present state of tissue, needle and seeds. Ultrasound: the probe is in the rectum, or behind the target if the
-scene has none; its array is at the centre of the target. Fluoroscopy: the C-arm turns about the centre of the target; 0 degrees looks
-from behind the patient, positive orbital angles move the detector to his left, positive cranial angles towards his head. The printed
-dose is the air kerma 15 cm before the isocentre. docs/imaging.md describes the simulation and its limits.
+The picture shows the present state of tissue, needle and seeds. Ultrasound: the probe is in the hand of rt-core --device-2; without one
+it is in the rectum, or behind the target if the scene has none, with its array at the centre of the target. Fluoroscopy: the C-arm turns
+about the centre of the target; 0 degrees looks from behind the patient, positive orbital angles move the detector to his left, positive
+cranial angles towards his head. The printed dose is the air kerma 15 cm before the isocentre. docs/imaging.md describes the simulation
+and its limits.
 
 Examples:
   host-ui picture --core target/quick/rt-core --scene pelvis --view transverse --template --out prostate.png
@@ -100,11 +100,12 @@ impl PictureArgs {
         let mut live = Live::connect(&self.asked, self.core.as_deref())?;
         let scene = live.scene.clone();
         let (field, metal) = now(&mut live, &scene)?;
-        let body = Body::of_scene(&scene.header, &scene.labels).ok_or("the scene has no labels to draw")?;
+        let body = Body::of_scene(&scene.header, &scene.labels).ok_or(NoPicture::NoLabels)?;
         let gpu = Gpu::headless(false)?;
+        let pose = Pose::now(&scene.header, live.link.second_state());
         let rgba = match self.view {
-            Wanted::Transverse => self.ultrasound(View::Transverse, gpu, &scene, (&body, &field, &metal))?,
-            Wanted::Sagittal => self.ultrasound(View::Sagittal, gpu, &scene, (&body, &field, &metal))?,
+            Wanted::Transverse => self.ultrasound(View::Transverse, pose, gpu, &scene, (&body, &field, &metal))?,
+            Wanted::Sagittal => self.ultrasound(View::Sagittal, pose, gpu, &scene, (&body, &field, &metal))?,
             Wanted::Fluoroscopy => self.fluoroscopy(gpu, &scene, (&body, &field, &metal)),
         };
         let bytes = rgba.into_iter().flatten().collect();
@@ -116,12 +117,13 @@ impl PictureArgs {
     fn ultrasound(
         &self,
         view: View,
+        pose: Pose,
         gpu: Gpu,
         scene: &SceneModel,
         (body, field, metal): (&Body, &Field, &Metal),
     ) -> Result<Vec<[u8; 4]>, CommandError> {
         let plane = Plane {
-            pose: Pose::of_scene(&scene.header).moved(self.way * 1e-3, self.turn.to_radians()),
+            pose: pose.moved(self.way * 1e-3, self.turn.to_radians()),
             view,
             probe: Probe::default(),
             depth_m: self.depth * 1e-3,
@@ -133,10 +135,8 @@ impl PictureArgs {
         };
         let mut scanner = Scanner::new(gpu);
         scanner.set_body(body, field);
-        scanner
-            .picture(&plane, &settings, metal)
-            .ok_or("the scene is too large for the graphics card")?;
-        let mut pixels = scanner.pixels();
+        let greys = scanner.greys(&plane, &settings, metal)?;
+        let mut pixels = opaque(greys);
         if self.template {
             let template = Template::before(&scene.header);
             for hole in Hole::all() {
@@ -162,26 +162,31 @@ impl PictureArgs {
             .shoot(&arm, &Attenuation::smooth(body), field, metal)
             .greys();
         println!("air kerma: {:.0} uGy", Exposure::default().air_kerma_gy(&arm) * 1e6);
-        greys.into_iter().map(|g| [g, g, g, 255]).collect()
+        opaque(greys)
     }
 }
 
-/// Returns the tissue and the metal of the first snapshot that arrives.
+fn opaque(greys: Vec<u8>) -> Vec<[u8; 4]> {
+    greys.into_iter().map(|g| [g, g, g, 255]).collect()
+}
+
+/// Returns the tissue and the metal of the first snapshot that arrives; waits for a second hand too.
 fn now(live: &mut Live, scene: &SceneModel) -> Result<(Field, Metal), CommandError> {
+    let is_whole = |link: &Link| {
+        let has_second = link.session().is_some_and(|session| session.has_second());
+        link.snapshot().is_some() && (!has_second || link.second_state().is_some())
+    };
     let start = Instant::now();
-    while live.link.snapshot().is_none() {
-        if start.elapsed() > SNAPSHOT_WITHIN {
-            return Err("rt-core sends no tissue; see its messages".into());
-        }
+    while !is_whole(&live.link) && start.elapsed() <= SNAPSHOT_WITHIN {
         std::thread::sleep(Duration::from_millis(10));
         live.link.poll();
     }
-    let nodes = scene.header.nodes;
     let snapshot = live.link.snapshot();
-    let field = snapshot.and_then(|s| Field::of(nodes, &s.displacements_m));
-    let mut shown = Shown::empty("");
-    shown.take(&live.link);
-    Ok((field.unwrap_or_else(|| Field::rest(nodes)), shown.metal()))
+    let snapshot = snapshot.ok_or("rt-core sends no tissue; see its messages")?;
+    let nodes = scene.header.nodes;
+    let field = Field::of(nodes, &snapshot.displacements_m);
+    let metal = Metal::of_snapshot(&snapshot.header, live.link.state());
+    Ok((field.unwrap_or_else(|| Field::rest(nodes)), metal))
 }
 
 /// Draws a dot of the template.

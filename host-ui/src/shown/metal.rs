@@ -1,35 +1,25 @@
 //! Seeds and needles for pictures of the body.
 
 use super::Shown;
-use nalgebra::Vector3;
-use stylet_imaging::{Metal, Needle, Seed};
-
-/// Drawn length of a needle, m.
-const NEEDLE_M: f64 = 0.15;
+use stylet_imaging::Metal;
 
 impl Shown {
     /// Returns all metal as it lies now.
     pub fn metal(&self) -> Metal {
-        let seeds = self.seeds.iter().map(|seed| Seed {
-            middle_m: self.drawn_at_m(seed).into(),
-            axis: seed.axis.into(),
-        });
-        let left = self.left.iter().map(|left| {
-            let tip = Vector3::from(left.tip_m);
-            vec![tip, tip - Vector3::from(left.direction) * NEEDLE_M]
-        });
-        let moving = self.needle_points_m(NEEDLE_M);
-        let moving = moving.map(|points| points.into_iter().map(Vector3::from).collect());
-        Metal {
-            seeds: seeds.collect(),
-            needles: left.chain(moving).map(|points_m| Needle { points_m }).collect(),
-        }
+        Metal::of(
+            &self.seeds,
+            self.body_moved_m,
+            &self.left,
+            &self.bend,
+            self.state.as_ref(),
+        )
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
     use stylet_shm_schema::SeedPose;
 
     /// Guards against seeds that stayed at the scene's place of the body while the tissue around

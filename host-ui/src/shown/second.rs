@@ -2,7 +2,7 @@
 
 use super::Shown;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use stylet_imaging::ultrasound::{Pose, Probe};
+use stylet_imaging::ultrasound::Pose;
 use stylet_shm_schema::{Fault, flags};
 
 /// Delay behind the needle's state at which the second loop counts as stopped; it writes its state
@@ -72,8 +72,7 @@ impl Shown {
     /// Returns the pose of the ultrasound probe in the second hand; `None` without a second device,
     /// and before its first tick.
     pub fn probe_pose(&self) -> Option<Pose> {
-        let (tip, turn) = (self.second_tip_m()?, self.scene_from_second()?);
-        Some(Pose::of_tool(tip.into(), &turn, &Probe::default()))
+        Pose::of_second(self.second.as_ref()?)
     }
 
     /// Returns whether the core moves the second hand on request: a simulated one, in a live run.
@@ -108,6 +107,7 @@ impl Shown {
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
+    use stylet_imaging::ultrasound::Probe;
     use stylet_shm_schema::SecondState;
 
     #[test]

@@ -43,7 +43,7 @@ impl Served {
         Self { child, address, log }
     }
 
-    fn connect(&self) -> TcpStream {
+    pub fn connect(&self) -> TcpStream {
         let stream = TcpStream::connect(&self.address).expect("it listens");
         stream
             .set_read_timeout(Some(Duration::from_secs(10)))
@@ -75,7 +75,7 @@ fn receive(stream: &mut TcpStream) -> Message {
 }
 
 /// Returns the next wanted message, within 600 messages.
-fn receive_one<T>(stream: &mut TcpStream, wanted: impl Fn(Message) -> Option<T>) -> T {
+pub fn receive_one<T>(stream: &mut TcpStream, wanted: impl Fn(Message) -> Option<T>) -> T {
     let mut messages = (0..600).map(|_| receive(stream));
     messages.find_map(wanted).expect("it comes")
 }

@@ -2,6 +2,7 @@
 //! moves its hand; the module for 3D Slicer shows a core with Slicer's own nodes.
 
 use crate::igtl::{Served, distance_m, tip_m, watched};
+use crate::igtl_picture::{SIDE, greys_of, written};
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
@@ -44,6 +45,10 @@ fn pyigtl_reads_every_message_but_status_of_which_it_knows_nothing() {
         (
             "polydata",
             r#"[[[0.0,0.0,0.0],[1.0,0.0,0.0],[0.0,1.0,0.0],[0.0,0.0,1.0]],[[3,0,2,1],[3,0,1,3]]]"#,
+        ),
+        (
+            "image",
+            r#"["ras",[[0.25,0.0,0.0,1.25],[0.0,0.0,2.0,-2.25],[0.0,-0.5,0.0,30.375],[0.0,0.0,0.0,1.0]],[[[0,1,127],[128,254,255]]]]"#,
         ),
         ("string", r#""Depth 31 mm, force 1.25 N""#),
     ] {
@@ -156,6 +161,32 @@ fn slicer_shows_what_the_core_has_and_says_when_none_runs() {
         "{shown}"
     );
     assert!(shown["words"].to_string().contains("rt-core --instance"), "{shown}");
+}
+
+#[test]
+#[ignore = "needs pyigtl and slicer-core: make igtl-test"]
+fn pyigtl_and_slicer_get_the_picture_that_host_ui_picture_writes() {
+    let core = Core::start_with(&["--no-rt", "--scene", "pelvis"]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let served = Served::start(&core, &["--image", "transverse"]);
+    let (host, port) = served.address.rsplit_once(':').expect("a port");
+    let png = written(&core, "transverse", folder.path());
+    let raw = folder.path().join("greys");
+    let read = pyigtl(&["picture", host, port, raw.to_str().expect("text")]);
+    assert_eq!(std::fs::read(raw).expect("written"), greys_of(&png));
+    assert_eq!(
+        (&read["frame"], &read["size"]),
+        (&"ras".into(), &serde_json::json!([1, SIDE, SIDE]))
+    );
+    let shown = python("slicer_nodes.py", &["picture", host, port, png.to_str().expect("text")]);
+    println!("{shown}");
+    assert_eq!(shown["off"], 0, "the largest difference of a pixel");
+    assert_eq!(shown["size"], serde_json::json!([SIDE, SIDE, 1]));
+    let at = |matrix: &serde_json::Value, n: usize| matrix[n / 4][n % 4].as_f64().expect("a number");
+    let off = (0..16).map(|n| (at(&shown["ras_from_ijk"], n) - at(&read["ras_from_ijk"], n)).abs());
+    assert!(off.fold(0.0, f64::max) < 1e-4, "{shown} {read}");
+    drop(served);
+    core.finish();
 }
 
 #[test]

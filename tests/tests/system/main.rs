@@ -14,6 +14,7 @@ mod force_insertions;
 mod formats;
 mod hostile;
 mod igtl;
+mod igtl_picture;
 mod igtl_python;
 mod insertion;
 mod kill;

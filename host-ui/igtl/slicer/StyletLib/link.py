@@ -140,10 +140,22 @@ def surface(body):
     return corners.astype(np.float32), triangles[:, 1:].astype(np.int64)
 
 
+def picture(body):
+    """Returns greys by row and column, and the matrix from column, row and slice to RAS; the message has the centre."""
+    kind, size = bytes(body[2:6]), np.frombuffer(body, ">u2", 3, 6).astype(int)
+    if kind[:2] != b"\x01\x03" or kind[3] != 1 or size[2] != 1:
+        raise ValueError("not one slice of greys in RAS")
+    greys = np.frombuffer(body, np.uint8, offset=72).reshape(size[1], size[0])
+    ras_from_ijk = matrix(body[12:60])
+    ras_from_ijk[:3, 3] -= ras_from_ijk[:3, :3] @ (size - 1) / 2
+    return greys, ras_from_ijk
+
+
 READERS = {
     ("Needle", "TRANSFORM"): matrix,
     ("Gland", "POLYDATA"): surface,
     ("Seeds", "POINT"): points,
+    ("Ultrasound", "IMAGE"): picture,
     ("State", "STRING"): lambda body: body[4:].decode(errors="replace"),
     ("Stylet", "STATUS"): lambda body: text(body[30:]),
 }

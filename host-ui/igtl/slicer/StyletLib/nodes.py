@@ -1,4 +1,4 @@
-"""Shows needle, seeds and gland as nodes of a MRML scene."""
+"""Shows needle, seeds, gland and ultrasound as nodes of a MRML scene."""
 
 import vtk
 from vtk.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
@@ -15,10 +15,16 @@ class Nodes:
 
     def __init__(self, scene):
         self.scene = scene
+        self._shows = (
+            ("Needle", self._needle),
+            ("Gland", self._gland),
+            ("Seeds", self._seeds),
+            ("Ultrasound", self._ultrasound),
+        )
 
     def show(self, newest):
         """Shows the newest content of each device, as `Link.poll` returns it."""
-        for device, show in (("Needle", self._needle), ("Gland", self._gland), ("Seeds", self._seeds)):
+        for device, show in self._shows:
             if device in newest:
                 show(newest[device])
 
@@ -54,6 +60,19 @@ class Nodes:
         for place_mm in places_mm:
             places.InsertNextPoint(place_mm)
         markups.SetControlPointPositionsWorld(places)
+
+    def _ultrasound(self, picture):
+        greys, ras_from_ijk = picture
+        volume, is_new = self._node("vtkMRMLScalarVolumeNode", "Stylet ultrasound")
+        image = vtk.vtkImageData()
+        image.SetDimensions(greys.shape[1], greys.shape[0], 1)
+        image.GetPointData().SetScalars(numpy_to_vtk(greys.ravel(), deep=True))
+        whole = vtk.vtkMatrix4x4()
+        whole.DeepCopy(ras_from_ijk.ravel())
+        volume.SetIJKToRASMatrix(whole)
+        volume.SetAndObserveImageData(image)
+        if is_new:
+            volume.CreateDefaultDisplayNodes()
 
     def _node(self, kind, name):
         """Returns the node of that name, and whether it is new."""

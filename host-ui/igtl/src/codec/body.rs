@@ -1,6 +1,7 @@
-//! Content of a message, of five types.
+//! Content of a message, of six types.
 
 use super::CodecError;
+use super::image::Image;
 use super::polydata::PolyData;
 use super::reader::{Reader, put_f32s, put_text};
 
@@ -60,6 +61,8 @@ pub enum Body {
     Points(Vec<Point>),
     /// A surface.
     PolyData(PolyData),
+    /// A grey picture.
+    Image(Image),
     /// State of a device.
     Status(Status),
     /// A text.
@@ -73,6 +76,7 @@ impl Body {
             Self::Transform(_) => "TRANSFORM",
             Self::Points(_) => "POINT",
             Self::PolyData(_) => "POLYDATA",
+            Self::Image(_) => "IMAGE",
             Self::Status(_) => "STATUS",
             Self::Text(_) => "STRING",
         }
@@ -84,6 +88,7 @@ impl Body {
             Self::Transform(columns) => columns.iter().for_each(|column| put_f32s(&mut bytes, column)),
             Self::Points(points) => points.iter().try_for_each(|point| point.encode(&mut bytes))?,
             Self::PolyData(surface) => surface.encode(&mut bytes)?,
+            Self::Image(image) => image.encode(&mut bytes)?,
             Self::Status(status) => {
                 bytes.extend(status.code.to_be_bytes());
                 bytes.extend(status.subcode.to_be_bytes());
@@ -121,6 +126,7 @@ impl Body {
                 Self::Points(points.collect::<Result<_, _>>()?)
             }
             "POLYDATA" => Self::PolyData(PolyData::decode(&mut reader)?),
+            "IMAGE" => Self::Image(Image::decode(&mut reader)?),
             "STATUS" => Self::Status(Status {
                 code: reader.u16()?,
                 subcode: reader.u64()? as i64,

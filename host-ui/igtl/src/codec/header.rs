@@ -14,10 +14,11 @@ const EXTENDED_VERSION: u16 = 2;
 const EXTENSION_AT_MOST: u64 = 4096;
 
 /// Types and the largest bodies of them that are accepted or sent, in bytes.
-const LIMITS: [(&str, u64); 5] = [
+const LIMITS: [(&str, u64); 6] = [
     ("TRANSFORM", 48),
     ("POINT", 136 * 4096),
     ("POLYDATA", 16 << 20),
+    ("IMAGE", 72 + 2048 * 2048),
     ("STATUS", 30 + 4096),
     ("STRING", 4 + 65_535),
 ];
@@ -49,7 +50,7 @@ impl Timestamp {
 /// Header of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Header {
-    /// Type, one of five.
+    /// Type, one of six.
     pub kind: &'static str,
     /// True for version 2, as protocol 3 sends it.
     pub is_extended: bool,

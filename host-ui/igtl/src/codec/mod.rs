@@ -7,12 +7,14 @@
 mod body;
 mod crc;
 mod header;
+mod image;
 mod polydata;
 mod reader;
 
 pub use body::{Body, Point, Status};
 pub use crc::crc64;
 pub use header::{HEADER_BYTES, Header, Timestamp};
+pub use image::Image;
 pub use polydata::PolyData;
 
 /// Error of bytes that are not a message, or of a message that cannot be encoded.
@@ -31,8 +33,10 @@ pub enum CodecError {
     /// The version of the header is unknown.
     #[error("header version 1 or 2 expected, {0} found")]
     Version(u16),
-    /// The type of message is not among the five.
-    #[error("message type {kind:?} is not supported; supported are TRANSFORM, POINT, POLYDATA, STATUS and STRING")]
+    /// The type of message is not among the six.
+    #[error(
+        "message type {kind:?} is not supported; supported are TRANSFORM, POINT, POLYDATA, IMAGE, STATUS and STRING"
+    )]
     Type {
         /// Name of the type.
         kind: String,

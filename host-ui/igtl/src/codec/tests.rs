@@ -35,6 +35,19 @@ pub fn examples() -> Vec<(&'static str, Message)> {
             }),
         ),
         (
+            "image",
+            Body::Image(Image {
+                size: [3, 2, 1],
+                columns: [
+                    [0.25, 0.0, 0.0],
+                    [0.0, 0.0, -0.5],
+                    [0.0, 2.0, 0.0],
+                    [1.5, -2.25, 30.125],
+                ],
+                greys: vec![0, 1, 127, 128, 254, 255],
+            }),
+        ),
+        (
             "status",
             Body::Status(Status {
                 code: 1,
@@ -140,4 +153,18 @@ fn a_changed_body_fails_its_checksum() {
     let mut bytes = examples()[0].1.encode().unwrap();
     bytes[HEADER_BYTES] ^= 1;
     assert!(matches!(Message::decode(&bytes), Err(CodecError::Checksum { .. })));
+}
+
+#[test]
+fn only_whole_greys_in_ras_are_images() {
+    let image = examples().into_iter().find(|(name, _)| *name == "image").unwrap().1;
+    let bytes = image.encode().unwrap();
+    // Version, components, type, frame, size, start and size of the part.
+    for at in [1, 2, 3, 5, 7, 9, 11, 61, 67] {
+        let mut bad = bytes.clone();
+        bad[HEADER_BYTES + at] += 1;
+        let sum = crc64(&bad[HEADER_BYTES..]);
+        bad[50..58].copy_from_slice(&sum.to_be_bytes());
+        assert!(matches!(Message::decode(&bad), Err(CodecError::Field(_))), "byte {at}");
+    }
 }

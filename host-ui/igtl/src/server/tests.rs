@@ -1,7 +1,7 @@
 //! Clients that read, that hang, and that arrive late.
 
 use super::*;
-use crate::codec::{Body, HEADER_BYTES, Header, Message, Timestamp};
+use crate::codec::{HEADER_BYTES, Header};
 use std::io::{Read, Write};
 use std::sync::mpsc;
 use std::time::Instant;

@@ -5,8 +5,8 @@ mod marks;
 mod plane;
 mod scanner;
 
-pub use plane::{Plane, Pose, Probe, View};
-pub use scanner::{Scanner, Settings};
+pub use plane::{FWHM, Plane, Pose, Probe, View};
+pub use scanner::{NoPicture, Scanner, Settings};
 
 #[cfg(test)]
 mod tests;

@@ -1,9 +1,9 @@
 //! Geometry of a probe: direction and width of its beams, and projection into the picture.
 
-use nalgebra::{UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;
 use stylet_anatomy::Organ;
-use stylet_shm_schema::SceneHeader;
+use stylet_shm_schema::{SceneHeader, SecondState};
 
 /// Pose of the probe: centre of its array on its axis, the axis, and direction of its middle beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +63,21 @@ impl Pose {
             axis,
             up: scene_from_tool * Vector3::y(),
         }
+    }
+
+    /// Returns the probe in the hand that holds the second device; `None` before its first tick.
+    pub fn of_second(second: &SecondState) -> Option<Self> {
+        let [i, j, k, w] = second.world_from_tool;
+        let scene_from_tool = UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 1e-6)?;
+        let tip_m = Vector3::from(second.tip_in_scene_m);
+        (second.tick > 0).then(|| Self::of_tool(tip_m, &scene_from_tool, &Probe::default()))
+    }
+
+    /// Returns the probe in the second hand; on its stepper, not yet moved, in a run without one.
+    pub fn now(scene: &SceneHeader, second: Option<&SecondState>) -> Self {
+        second
+            .and_then(Self::of_second)
+            .unwrap_or_else(|| Self::of_scene(scene))
     }
 
     /// Returns the foremost point of the probe, m.

@@ -64,6 +64,20 @@ struct Shot([[f32; 4]; 13]);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 struct Scan([[f32; 4]; 3]);
 
+/// Reason why a scene has no picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoPicture {
+    /// Nothing of the body is known.
+    #[error("the scene has no labels to draw")]
+    NoLabels,
+    /// Labels or nodes exceed what a texture holds.
+    #[error("the scene is too large for the graphics card")]
+    TooLarge,
+    /// The driver has given up the device.
+    #[error("the graphics device was lost; start the program again")]
+    Lost,
+}
+
 /// Tissues and displacements on the card.
 struct OnCard {
     tissues: wgpu::TextureView,
@@ -180,6 +194,18 @@ impl Scanner {
         self.buffers
             .as_ref()
             .map_or_else(Vec::new, |b| self.gpu.pixels(&b.target))
+    }
+
+    /// Computes the picture of a plane and returns its greys, row by row from the top.
+    ///
+    /// # Errors
+    ///
+    /// Without a body that fits the card, or if the device was lost.
+    pub fn greys(&mut self, plane: &Plane, settings: &Settings, metal: &Metal) -> Result<Vec<u8>, NoPicture> {
+        self.picture(plane, settings, metal).ok_or(NoPicture::TooLarge)?;
+        let greys: Vec<u8> = self.pixels().into_iter().map(|[grey, ..]| grey).collect();
+        let [wide, high] = plane.pixels.map(|side| side as usize);
+        (greys.len() == wide * high).then_some(greys).ok_or(NoPicture::Lost)
     }
 
     /// Returns decibels over the mean echo of the gland, by sample and beam, before scan

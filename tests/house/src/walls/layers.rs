@@ -270,16 +270,19 @@ pub const LAYERS: &[Layer] = &[
         not_itself: &[PORTS, ARGUMENTS],
     },
     Layer {
+        // Its pictures of the probe are those of `host-ui picture`.
         folder: "host-ui/igtl",
         may_use: &[
             "host-ui/base",
             "host-ui/host",
+            "host-ui/imaging",
+            "host-ui/surfaces",
             "shm-schema",
             "shm-schema/anatomy",
             "shm-schema/manual",
             "shm-schema/random",
         ],
-        never: &[WINDOW, DEVICES],
+        never: &[TOOLKIT, DEVICES],
         not_itself: &[PORTS, DICOM],
     },
     Layer {

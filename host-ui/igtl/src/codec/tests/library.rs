@@ -81,7 +81,23 @@ fn message(kind: usize, random: &mut Random) -> Message {
                 .collect();
             Body::PolyData(PolyData { points, triangles })
         }
-        3 => Body::Status(Status {
+        3 => {
+            let size = [0; 3].map(|_| 1 + random.below(12) as u16);
+            let step = |axis: usize, random: &mut Random| {
+                let mut way = [0.0; 3];
+                way[axis] = (1 + random.below(999)) as f32 / 256.0;
+                way
+            };
+            let from = random.below(3);
+            let [column, row, slice] = [0, 1, 2].map(|n| step((from + n) % 3, random));
+            let count = size.iter().map(|&side| usize::from(side)).product();
+            Body::Image(Image {
+                size,
+                columns: [column, row, slice, place(random)],
+                greys: (0..count).map(|_| random.below(256) as u8).collect(),
+            })
+        }
+        4 => Body::Status(Status {
             code: random.below(20) as u16,
             subcode: random.below(1 << 30) as i64 - (1 << 29),
             error: word(random, 19),
@@ -106,7 +122,7 @@ fn three_thousand_messages_come_back_from_the_library_byte_for_byte() {
     let folder = compiled("echo");
     let mut random = Random(1900);
     let sent: Vec<Vec<u8>> = (0..3000)
-        .map(|i| message(i % 5, &mut random).encode().unwrap())
+        .map(|i| message(i % 6, &mut random).encode().unwrap())
         .collect();
     let mut echo = Command::new(folder.join("echo"))
         .stdin(Stdio::piped())
