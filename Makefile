@@ -76,6 +76,15 @@ report: ## Measure speed against error of every tissue model; writes benches/run
 seeds-oracle: ## Compare seeds, forces and motion of the gland with tests/oracles/seeds_at_rest.py in every case of docs/physics/needle-line.md
 	$(CARGO) test --profile quick -p stylet-runtime --lib by_another_method -- --ignored --nocapture
 
+WASM = $(abspath $(or $(CARGO_TARGET_DIR),target))/web
+
+wasm-test: ## Repeat a flight recording (FLIGHT=FILE), or measure a tick, as the page's wasm by node and natively
+	@docs/tools/need cargo nodejs
+	[ -d "$$(rustc --print sysroot)/lib/rustlib/wasm32-unknown-unknown" ] || rustup target add wasm32-unknown-unknown
+	RUSTFLAGS="-C target-feature=+simd128" CARGO_TARGET_DIR="$(WASM)" $(CARGO) rustc --profile quick --target wasm32-unknown-unknown -p stylet-tests-wasm --lib --crate-type cdylib
+	node tests/wasm/run.mjs "$(WASM)/wasm32-unknown-unknown/quick/stylet_tests_wasm.wasm" $(FLIGHT)
+	$(CARGO) run --profile quick -p stylet-tests-wasm -- $(FLIGHT)
+
 causes: ## Inject ten causes of late ticks into measurements, and see which of them the trace names (as root, about a minute)
 	$(CARGO) build --profile quick --workspace --bin rt-core --bin stylet-bridge --bin stylet-lab
 	$(CARGO) test --profile quick -p stylet-tests-lab -- eight_of_ten without_a_trace --ignored --nocapture --test-threads=1

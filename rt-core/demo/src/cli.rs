@@ -49,9 +49,9 @@ fn carry_out(task: Task) -> Result<(), Box<dyn Error>> {
     stylet_manual::end_with_reader();
     match task {
         Task::Demo { scene, tissue } => {
-            // A window keeps its plan by the name of its core.
+            // A window keeps its plan by the name of its core; this core ends with the window.
             let mut options = Options::default();
-            options.core.instance = Instance::new("demo")?;
+            options.core.instance = Instance::new(&format!("demo-{}", std::process::id()))?;
             let instance = options.core.instance.clone();
             let ended = app::run(options, core::home(scene, tissue));
             instance.sweep();
