@@ -45,10 +45,10 @@ pub const PRODUCTS: [Product; 3] = [
 
 /// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.
 ///
-/// Start `rt-core` first, then `host-ui` for the window; `host-ui demo` needs no `rt-core`. `host-ui procedure` implants the seeds of
-/// the default plan without a window and writes the results. In the window, keys, mouse, a gamepad
-/// or a 3D mouse hold the needle: F1 lists their functions, `host-ui controllers` lists the
-/// connected ones.
+/// Start `rt-core` first, then `host-ui` for the window; `host-ui demo` needs no `rt-core`.
+/// `host-ui procedure` implants the seeds of the default plan without a window and writes the
+/// results. In the window, keys, mouse, a gamepad or a 3D mouse hold the needle: F1 lists their
+/// functions, `host-ui controllers` lists the connected ones.
 #[derive(Parser, Debug)]
 #[command(name = "host-ui", version, args_conflicts_with_subcommands = true, after_help = stylet_manual::list("host-ui", &PRODUCTS))]
 pub struct Cli {

@@ -20,7 +20,7 @@ if (flightPath) {
     const flight = readFileSync(flightPath);
     const at = core.room(flight.length);
     new Uint8Array(core.memory.buffer, at, flight.length).set(flight);
-    guarded(() => core.repeat_input());
+    process.exitCode = guarded(() => core.repeat_input()) ? 0 : 1;
     process.stdout.write(text());
 } else {
     core.room(0);

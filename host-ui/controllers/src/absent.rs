@@ -1,18 +1,18 @@
-//! The end of a window in a web page, which reads no devices of the system.
+//! Controllers in a web page, which reads no devices of the system.
 
 use super::kind::Button;
 use super::latest::Latest;
 
-/// Window's end without devices.
+/// No controllers.
 pub struct Controllers;
 
 impl Controllers {
-    /// Creates an end without a thread: no device ever holds the needle.
+    /// Returns controllers of which none ever holds the needle.
     pub fn none() -> Self {
         Self
     }
 
-    /// Nothing follows: there are no devices.
+    /// Has no effect: there are no devices.
     pub fn use_two_hands(&self, _two_hands: bool) {}
 
     /// Returns no device and no button.

@@ -61,6 +61,7 @@ pub struct Link {
     receiver: Receiver,
     /// Present for a recording that replaces a core.
     playback: Option<Playback>,
+    is_here: bool,
     instance: Instance,
     host_id: u64,
     next_command_id: u64,
@@ -101,7 +102,15 @@ impl Link {
         make: impl FnOnce() -> Result<C, E> + Send + 'static,
     ) -> Self {
         let host_id = random_host_id();
-        Self::of(instance, host_id, Receiver::here(host_id, make), None)
+        Self {
+            is_here: true,
+            ..Self::of(instance, host_id, Receiver::here(host_id, make), None)
+        }
+    }
+
+    /// Returns whether the core is in this process, stepped without loops whose timing could be measured.
+    pub fn is_here(&self) -> bool {
+        self.is_here
     }
 
     /// Plays a recording as if from a core; every request is refused.
@@ -128,6 +137,7 @@ impl Link {
         Self {
             receiver,
             playback,
+            is_here: false,
             instance,
             host_id,
             next_command_id: 1,

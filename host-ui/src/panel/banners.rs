@@ -283,7 +283,7 @@ pub fn not_real_time_words(shown: &Shown) -> String {
     let advice = shown.session.map(|s| s.advice.read()).unwrap_or_default();
     let asked = shown.session.is_some_and(|s| s.no_rt_asked != 0);
     match (advice.trim(), asked) {
-        _ if shown.is_stepped() => {
+        _ if shown.is_stepped => {
             "The core is stepped by this window: motion and force are computed late, and no device renders the force."
                 .to_owned()
         }

@@ -47,7 +47,7 @@ pub fn plots_ui(
     } else {
         0.0
     };
-    let (plots, under) = match shown.is_stepped() {
+    let (plots, under) = match shown.is_stepped {
         true => (Quantity::ALL.len() as f32 - 1.0, UNDER_STEPPED),
         false => (Quantity::ALL.len() as f32, UNDER_PLOTS),
     };
@@ -90,7 +90,7 @@ pub fn plots_ui(
             );
         }
     }
-    if shown.is_stepped() {
+    if shown.is_stepped {
         return setup::setup_ui(ui, shown);
     }
     let worst = now(shown

@@ -27,12 +27,12 @@ pub fn setup_ui(ui: &mut egui::Ui, shown: &Shown) {
             };
             if let Some(session) = &shown.session {
                 row("device", session.device.read(), true);
-                if shown.is_stepped() {
-                    row("both loops", "stepped by this window".to_owned(), true);
-                } else {
-                    row("force loop", thread(&session.haptic), session.haptic.is_fifo());
-                    row("tissue loop", thread(&session.tissue), session.tissue.is_fifo());
-                }
+            }
+            if shown.is_stepped {
+                row("both loops", "stepped by this window".to_owned(), true);
+            } else if let Some(session) = &shown.session {
+                row("force loop", thread(&session.haptic), session.haptic.is_fifo());
+                row("tissue loop", thread(&session.tissue), session.tissue.is_fifo());
                 if session.has_second() {
                     let fine = session.second.is_fifo() && !matches!(shown.second_hand(), Some(SecondHand::Faulty(_)));
                     row("device 2", session.second_device.read(), fine);
@@ -43,9 +43,7 @@ pub fn setup_ui(ui: &mut egui::Ui, shown: &Shown) {
                 } else {
                     "not locked: pages may be missing"
                 };
-                if !shown.is_stepped() {
-                    row("memory", memory.to_owned(), locked);
-                }
+                row("memory", memory.to_owned(), locked);
             }
             let (link, fine) = link(shown);
             row("link", link, fine);

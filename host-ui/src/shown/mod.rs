@@ -39,6 +39,8 @@ pub struct Shown {
     pub instance: String,
     pub status: LinkStatus,
     pub session: Option<Session>,
+    /// True if this window steps its core, which then has no timing to show.
+    pub is_stepped: bool,
     /// Line to the core, if that runs on another machine.
     pub relayed: Option<Relayed>,
     /// Hosts connected over a relay of this machine.
@@ -118,6 +120,7 @@ impl Shown {
     pub fn take(&mut self, link: &Link) {
         self.status = link.status();
         self.session = link.session().copied();
+        self.is_stepped = link.is_here();
         self.relayed = link.relayed().copied();
         self.class = link.class().copied();
         self.state = link.state().copied();
@@ -163,12 +166,6 @@ impl Shown {
 
     pub fn is_absent(&self) -> bool {
         matches!(self.status, LinkStatus::Absent { .. })
-    }
-
-    /// Returns whether this window steps its core, which then has no loops whose timing could be measured.
-    pub fn is_stepped(&self) -> bool {
-        // A recording does not keep the process of its core.
-        self.watched.is_none() && self.session.is_some_and(|session| session.pid == 0)
     }
 
     /// Returns whether the newest tick has a bit of [`flags`].

@@ -48,12 +48,16 @@ pub extern "C" fn text_len() -> usize {
     with(|shared| shared.text.len())
 }
 
-/// Repeats the recording in the input; the text says what differs.
+/// Repeats the recording in the input; true if every bit is the same. The text says what differs.
 #[unsafe(no_mangle)]
-pub extern "C" fn repeat_input() {
+pub extern "C" fn repeat_input() -> bool {
     let input = with(|shared| std::mem::take(&mut shared.input));
-    let text = repeat(&input, || {}).map_or_else(|why| format!("{why}\n"), |found| found.to_string());
+    let (text, is_same) = match repeat(&input, || {}) {
+        Ok(found) => (found.to_string(), found.is_same()),
+        Err(why) => (format!("{why}\n"), false),
+    };
     with(|shared| shared.text = text);
+    is_same
 }
 
 /// Prepares a needle in tissue of that number among [`TissueKind::ALL`]; false if there is none.

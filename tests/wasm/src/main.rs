@@ -1,5 +1,6 @@
 //! As `run.mjs`, but native: `stylet-tests-wasm FILE.flight [--denormals]`, or without a file the cost of a tick.
 
+use std::process::ExitCode;
 use stylet_runtime::rt::arm::{Ask, arm};
 use stylet_sim::scene::TissueKind;
 use stylet_tests_wasm::{Bench, repeat};
@@ -7,7 +8,7 @@ use stylet_tests_wasm::{Bench, repeat};
 /// Rehearsals of which the fastest counts.
 const RUNS: usize = 5;
 
-fn main() {
+fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let has_denormals = arguments.iter().any(|argument| argument == "--denormals");
     let as_loops = || {
@@ -22,11 +23,17 @@ fn main() {
     let file = arguments.iter().find(|argument| !argument.starts_with("--"));
     if let Some(file) = file {
         let bytes = std::fs::read(file).unwrap_or_else(|why| panic!("{file}: {why}"));
-        match repeat(&bytes, as_loops) {
-            Ok(found) => print!("{found}"),
-            Err(why) => println!("{why}"),
-        }
-        return;
+        let is_same = match repeat(&bytes, as_loops) {
+            Ok(found) => {
+                print!("{found}");
+                found.is_same()
+            }
+            Err(why) => {
+                println!("{why}");
+                false
+            }
+        };
+        return if is_same { ExitCode::SUCCESS } else { ExitCode::FAILURE };
     }
     as_loops();
     for tissue in [TissueKind::Paper, TissueKind::ChainMail] {
@@ -42,6 +49,7 @@ fn main() {
             tissue.name()
         );
     }
+    ExitCode::SUCCESS
 }
 
 /// Processor time of the main thread: other programs may keep this one waiting.

@@ -80,6 +80,13 @@ pub fn repeat(bytes: &[u8], arm: impl FnOnce()) -> Result<Repetition, Repetition
     Ok(found)
 }
 
+impl Repetition {
+    /// True if every number was repeated with the same bits.
+    pub fn is_same(&self) -> bool {
+        self.loops.iter().all(Repeated::is_identical) && self.differences.iter().all(Differences::is_empty)
+    }
+}
+
 type Number = (&'static str, f64);
 
 fn compare(into: &mut Differences, tick: usize, then: &[Number], now: &[Number], digest: &mut Sha256) {

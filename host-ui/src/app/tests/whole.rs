@@ -100,6 +100,10 @@ pub const STATES: &[State] = &[
     }),
     ("recording at its end", |app| recorded(app, one_needle(0.0, 5), true)),
     ("scene", |app| app.shown = live()),
+    ("core in this process", |app| {
+        app.shown = live();
+        app.shown.is_stepped = true;
+    }),
     ("file is read", |app| {
         app.shown = live();
         app.shown.load = LoadState::Reading(format!("{LONG_PATH}: resampling to the lattice"), 0.4);
